@@ -1,0 +1,42 @@
+# Targets of one line; the work is in tools/. PYTHON=... chooses the interpreter for .venv.
+
+.DEFAULT_GOAL := help
+.PHONY: help setup setup-test test lint fly bench-flights clean
+
+# A sourced ROS installation must not mix with the ROS in .venv, and a Python started by the ROS
+# wheels hands down a guard that would keep those of .venv from starting.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH PYTHONHOME PYTHONPATH
+
+BIN := .venv/bin
+DISC ?=
+THROW ?=
+export PYTHON
+
+help: ## list the targets
+	@echo 'make TARGET, where TARGET is one of'
+	@sed -n 's/^\([a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
+		printf '  %-14s %s\n' "$$name" "$$text"; done
+
+setup: ## make .venv with the package and ROS 2 Jazzy (PYTHON=python3.12 chooses the Python)
+	@tools/setup-venv run
+
+setup-test:
+	@tools/setup-venv test
+
+test: setup-test ## setup, then every test, ruff, mypy and the import rules
+	@tools/check tests ruff format mypy imports
+
+lint: setup-test ## the same without the tests
+	@tools/check ruff format mypy imports
+
+fly: setup ## throw the disc of the paper's Fig. 5 (DISC=wraith THROW='--speed 20 --pitch 10')
+	@mkdir -p flights
+	@$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW)
+
+bench-flights: setup ## measure flights per second
+	@$(BIN)/python benchmarks/flights.py
+
+clean: ## remove .venv, builds and caches; keep flights/ and bags/
+	rm -rf .venv build dist install log *.egg-info .coverage .hypothesis \
+		.import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

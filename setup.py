@@ -1,0 +1,102 @@
+"""Build file for colcon (ament_python) and pip."""
+
+from pathlib import Path
+import re
+import sys
+
+from setuptools import Distribution, find_packages, setup
+
+NAME = 'disc_sim_ros'
+
+# A new executable is one line here and one file in scripts/, a copy of scripts/fly with its name.
+EXECUTABLES = {
+    'fly': 'disc_sim_ros.cli.fly:main',
+}
+
+SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz')
+
+
+class DataDistribution(Distribution):
+    """Tells `pip install -e` that there are data files; without it they are skipped."""
+
+    def has_data(self) -> bool:
+        """Answer the question that editable_wheel asks, which setuptools leaves open."""
+        return self.has_data_files()
+
+
+def version() -> str:
+    """Read the version without importing the package and what it needs."""
+    text = Path(NAME, '__init__.py').read_text(encoding='utf-8')
+    found = re.search(r"^__version__ = '([^']+)'$", text, re.MULTILINE)
+    if found is None:
+        raise RuntimeError(f"{NAME}/__init__.py: no line __version__ = '...'")
+    return found[1]
+
+
+def data_files() -> list[tuple[str, list[str]]]:
+    """List every file outside the package and the folder it is installed in."""
+    files = [
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+    ]
+    shared = [path for top in SHARED_FOLDERS for path in sorted(Path(top).rglob('*'))]
+    files += [
+        (f'share/{NAME}/{path.parent.as_posix()}', [path.as_posix()])
+        for path in shared
+        if path.is_file() and '__pycache__' not in path.parts
+    ]
+    # A wheel ignores install_scripts in setup.cfg: colcon alone would fill lib/disc_sim_ros.
+    if {'bdist_wheel', 'editable_wheel', 'sdist'} & set(sys.argv):
+        files.append(
+            (f'lib/{NAME}', sorted(path.as_posix() for path in Path('scripts').iterdir()))
+        )
+    return files
+
+
+setup(
+    name=NAME,
+    version=version(),
+    description='Real-time flight simulator of a spin-stabilised disc for ROS 2',
+    long_description=(
+        'Flies a Frisbee after Crowther and Potts (2007): correct gyroscopics, control inputs, '
+        'ROS 2 messages, MCAP bags.'
+    ),
+    maintainer='disc_sim_ros maintainers',
+    maintainer_email='maintainers@disc-sim.example.org',
+    license='Apache-2.0',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['py.typed', 'core/discs/*.yaml']},
+    data_files=data_files(),
+    distclass=DataDistribution,
+    zip_safe=False,
+    python_requires='>=3.11',
+    install_requires=[
+        'numpy>=1.26,<3',
+        'numba>=0.60,<1',
+        'PyYAML>=6.0,<7',
+        'matplotlib>=3.8,<4',
+    ],
+    extras_require={
+        # Only for people without a ROS installation. Always the ros-jazzy- names: the bare ones
+        # are the next distribution.
+        'jazzy': [
+            'ros-jazzy-rclpy[fastrtps]',
+            'ros-jazzy-common-interfaces',
+        ],
+        'test': [
+            'pytest>=8,<10',
+            'pytest-timeout>=2.3,<3',
+            'hypothesis>=6.100,<7',
+            'scipy>=1.11,<2',
+            'ruff>=0.14,<1',
+            'mypy>=1.15,<3',
+            'types-PyYAML',
+            'import-linter>=2.3,<3',
+            'colcon-core>=0.19,<1',
+            'colcon-ros>=0.5,<1',
+        ],
+    },
+    entry_points={
+        'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],
+    },
+)

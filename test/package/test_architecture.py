@@ -1,0 +1,81 @@
+"""The import rules of pyproject.toml hold, and the linter that checks them can fail."""
+
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = 'disc_sim_ros'
+MAY_TALK_ROS = {'cli', 'nodes'}
+
+
+def contracts() -> dict[str, dict]:
+    settings = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
+    return {c['name']: c for c in settings['tool']['importlinter']['contracts']}
+
+
+@pytest.fixture
+def tree(tmp_path) -> Path:
+    """A copy of the package that a test may spoil; folders still to come are made empty."""
+    shutil.copytree(
+        ROOT / PACKAGE, tmp_path / PACKAGE, ignore=shutil.ignore_patterns('__pycache__')
+    )
+    shutil.copy(ROOT / 'pyproject.toml', tmp_path)
+    for folder in ('analysis', 'bags', 'cli', 'core', 'experiments', 'nodes'):
+        (tmp_path / PACKAGE / folder).mkdir(exist_ok=True)
+        (tmp_path / PACKAGE / folder / '__init__.py').touch()
+    return tmp_path
+
+
+def lint(folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [Path(sys.executable).with_name('lint-imports'), '--no-cache'],
+        cwd=folder,
+        env={**os.environ, 'PYTHONPATH': str(folder), 'COLUMNS': '200'},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_import_rules_hold(tree):
+    result = lint(tree)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize(
+    ('where', 'line', 'broken'),
+    [
+        ('core', 'import rclpy', 'only nodes and cli talk ROS'),
+        ('core', 'from nav_msgs.msg import Odometry', 'only nodes and cli talk ROS'),
+        ('analysis', 'import rclpy', 'only nodes and cli talk ROS'),
+        ('core', 'import matplotlib', 'the physics draws nothing and records nothing'),
+        ('core', 'import mcap', 'the physics draws nothing and records nothing'),
+        ('core', f'import {PACKAGE}.bags', 'one way, down to the physics'),
+        ('bags', f'import {PACKAGE}.analysis', 'one way, down to the physics'),
+        ('experiments', f'import {PACKAGE}.nodes', 'one way, down to the physics'),
+        ('nodes', f'import {PACKAGE}.analysis', 'nodes and analysis are strangers'),
+        ('nodes', f'import {PACKAGE}.cli', 'one way, down to the physics'),
+    ],
+)
+def test_the_linter_sees_a_violation(tree, where, line, broken):
+    (tree / PACKAGE / where / 'spoilt.py').write_text(f'{line}\n', encoding='utf-8')
+    result = lint(tree)
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert f'{broken} BROKEN' in result.stdout
+    assert 'spoilt' in result.stdout
+
+
+def test_every_folder_is_under_the_rules():
+    """A folder made later must not slip through because no contract names it."""
+    folders = {path.parent.name for path in (ROOT / PACKAGE).glob('*/__init__.py')}
+    layers = ' '.join(contracts()['one way, down to the physics']['layers'])
+    silent = contracts()['only nodes and cli talk ROS']['source_modules']
+    for folder in folders:
+        assert f'{PACKAGE}.{folder}' in layers
+        assert folder in MAY_TALK_ROS or f'{PACKAGE}.{folder}' in silent

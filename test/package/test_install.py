@@ -1,0 +1,239 @@
+"""pip and colcon install the same executables and share files, from a copy of this tree."""
+
+import ast
+from importlib.util import find_spec
+import json
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+import venv
+import xml.etree.ElementTree as ET
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = 'disc_sim_ros'
+TALK_ROS = {'sim_node', 'recorder_node', 'demo'}  # the only executables that may need rclpy
+SHARED = ('config', 'launch', 'urdf', 'rviz')
+
+# What a virtual environment, a sourced ROS or the ROS wheels hand down to the programs they start.
+INHERITED = re.compile(
+    r'PYTHON|VIRTUAL_ENV|_?ROS_|AMENT_|COLCON_|CMAKE_PREFIX_PATH|LD_LIBRARY_PATH|NUMBA_|MAKE|MFLAGS'
+)
+
+
+def clean_environment() -> dict[str, str]:
+    return {name: value for name, value in os.environ.items() if not INHERITED.match(name)}
+
+
+def run(*command, cwd: Path, code: int = 0, **more: str) -> str:
+    """Run a command as a user would and return what it printed."""
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        env=clean_environment() | more,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    output = f'{done.stdout}\n{done.stderr}'
+    assert done.returncode == code, f'{command} ended with {done.returncode}:\n{output}'
+    return done.stdout
+
+
+def executables() -> dict[str, str]:
+    """The list in setup.py, read without running it."""
+    for node in ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8')).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'EXECUTABLES':
+            return ast.literal_eval(node.value)
+    raise AssertionError('setup.py has no list EXECUTABLES')
+
+
+def source_files() -> list[Path]:
+    """What a checkout holds; without git, all but what the tools make."""
+    listed = None
+    if shutil.which('git'):
+        listed = subprocess.run(
+            ['git', 'ls-files', '-coz', '--exclude-standard'],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if listed and listed.returncode == 0:
+        names = [Path(name) for name in listed.stdout.split('\0') if name]
+    else:
+        made = re.compile(
+            r'\.(venv|git|hypothesis|.*_cache)|build|dist|install|log|flights|bags|.*\.egg-info'
+        )
+        names = [
+            path.relative_to(ROOT)
+            for top in ROOT.iterdir()
+            if not made.fullmatch(top.name)
+            for path in ([top] if top.is_file() else top.rglob('*'))
+            if '__pycache__' not in path.parts
+        ]
+    return [name for name in names if (ROOT / name).is_file()]
+
+
+def copy_source(target: Path) -> Path:
+    for name in source_files():
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, target / name)
+    return target
+
+
+def check_files(prefix: Path) -> None:
+    """Everything that `ros2 run` and `ros2 launch` look for is below the prefix."""
+    programs = prefix / 'lib' / PACKAGE
+    assert {path.name for path in programs.iterdir()} == set(executables())
+    assert all(os.access(path, os.X_OK) for path in programs.iterdir())
+    assert (prefix / 'share/ament_index/resource_index/packages' / PACKAGE).is_file()
+    share = prefix / 'share' / PACKAGE
+    assert (share / 'package.xml').is_file()
+    for name in source_files():
+        if name.parts[0] in SHARED:
+            assert (share / name).read_bytes() == (ROOT / name).read_bytes()
+
+
+def check_package_data(site: Path) -> None:
+    assert (site / PACKAGE / 'py.typed').is_file()
+    for name in source_files():
+        if name.parts[:3] == (PACKAGE, 'core', 'discs') and name.suffix == '.yaml':
+            assert (site / name).is_file(), f'{name} is not installed'
+
+
+@pytest.fixture(scope='module')
+def pip_prefix(tmp_path_factory) -> Path:
+    """A fresh virtual environment without ROS, with a space in every path."""
+    folder = tmp_path_factory.mktemp('with pip')
+    source = copy_source(folder / 'a source')
+    prefix = folder / 'a prefix'
+    venv.create(prefix, with_pip=True, symlinks=True)
+    # Compiling all of matplotlib and numba to bytecode would double the time of this test.
+    run(prefix / 'bin/python', '-m', 'pip', 'install', '--no-compile', source, cwd=folder)
+    return prefix
+
+
+@pytest.fixture(scope='module')
+def colcon_workspace(tmp_path_factory) -> Path:
+    """A workspace that colcon has built, with the Python and the tools of this environment."""
+    workspace = tmp_path_factory.mktemp('colcon')
+    copy_source(workspace / 'src' / PACKAGE)
+    # colcon writes the path of its Python into scripts that no shell reads where it has a space.
+    environment = workspace / 'environment'
+    environment.symlink_to(sys.prefix)
+    colcon = (environment / 'bin/python', environment / 'bin/colcon')
+    output = run(*colcon, 'build', '--base-paths', 'src', cwd=workspace)
+    assert f'Finished <<< {PACKAGE}' in output
+    return workspace
+
+
+def run_sourced(workspace: Path, *command, **more: str) -> str:
+    """Run a command in the workspace after sourcing it, as `ros2 run` needs it."""
+    script = '. install/setup.sh && exec "$@"'
+    return run('sh', '-c', script, 'sh', *command, cwd=workspace, **more)
+
+
+def test_scripts_and_executables_agree():
+    assert {path.name for path in (ROOT / 'scripts').iterdir()} == set(executables())
+
+
+@pytest.mark.parametrize('name', sorted(executables()))
+def test_each_script_starts_the_executable_of_its_name(name, tmp_path):
+    script = tmp_path / 'a prefix/lib' / PACKAGE / name
+    script.parent.mkdir(parents=True)
+    shutil.copy(ROOT / 'scripts' / name, script)
+    program = tmp_path / 'a prefix/bin' / name
+    program.parent.mkdir()
+    program.write_text('#!/bin/sh\nprintf "<%s>" "$@"; exit 7\n', encoding='utf-8')
+    program.chmod(0o755)
+    assert run(script, 'a b', '', '*', cwd=tmp_path, code=7) == '<a b><><*>'
+
+
+def test_the_version_is_the_same_everywhere():
+    # setup.py reads the version from the package; test_pip_metadata covers that.
+    version = run(
+        sys.executable, '-c', f'import {PACKAGE}; print({PACKAGE}.__version__)', cwd=ROOT
+    ).strip()
+    assert ET.parse(ROOT / 'package.xml').findtext('version') == version
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    loaded = run(
+        sys.executable,
+        '-c',
+        f'import {PACKAGE}, sys; print(*{{"rclpy", "numba", "numpy"}} & set(sys.modules))',
+        cwd=ROOT,
+    )
+    assert loaded.strip() == ''
+
+
+@pytest.mark.packaging
+@pytest.mark.timeout(600)
+def test_pip_installs_all_files(pip_prefix):
+    check_files(pip_prefix)
+    check_package_data(next((pip_prefix / 'lib').glob('python3*/site-packages')))
+
+
+@pytest.mark.packaging
+def test_pip_metadata(pip_prefix):
+    show = run(pip_prefix / 'bin/python', '-m', 'pip', 'show', PACKAGE, cwd=pip_prefix)
+    version = ET.parse(ROOT / 'package.xml').findtext('version')
+    assert f'Version: {version}' in show.splitlines()
+    assert 'ros-jazzy' not in show
+
+
+@pytest.mark.packaging
+def test_executables_that_do_not_talk_ros_run_without_it(pip_prefix):
+    run(pip_prefix / 'bin/python', '-c', 'import rclpy', cwd=pip_prefix, code=1)
+    for name in sorted(set(executables()) - TALK_ROS):
+        for folder in ('bin', f'lib/{PACKAGE}'):
+            assert 'usage' in run(pip_prefix / folder / name, '--help', cwd=pip_prefix).lower()
+
+
+@pytest.mark.packaging
+def test_fly_flies_after_pip(pip_prefix):
+    cache = pip_prefix / 'cache'
+    fly = pip_prefix / 'lib' / PACKAGE / 'fly'
+    document = run(fly, '--json', cwd=pip_prefix, NUMBA_CACHE_DIR=str(cache))
+    assert json.loads(document)['landed'] is True
+
+
+@pytest.mark.packaging
+@pytest.mark.timeout(600)
+def test_colcon_installs_all_files(colcon_workspace):
+    prefix = colcon_workspace / 'install' / PACKAGE
+    check_files(prefix)
+    check_package_data(next((prefix / 'lib').glob('python3*/site-packages')))
+    # Only there when colcon took the package for a ROS package and not for plain Python.
+    assert (prefix / f'share/{PACKAGE}/hook/ament_prefix_path.sh').is_file()
+
+
+@pytest.mark.packaging
+def test_python_finds_what_colcon_installed(colcon_workspace):
+    """Not the editable install of this environment, or the tests below would prove nothing."""
+    python = colcon_workspace / 'environment/bin/python'
+    found = run_sourced(
+        colcon_workspace, python, '-P', '-c', f'import {PACKAGE}; print({PACKAGE}.__file__)'
+    )
+    assert Path(found.strip()).is_relative_to(colcon_workspace / 'install')
+
+
+@pytest.mark.packaging
+def test_executables_run_after_colcon(colcon_workspace):
+    programs = colcon_workspace / 'install' / PACKAGE / 'lib' / PACKAGE
+    without_ros = TALK_ROS if find_spec('rclpy') is None else set()
+    for name in sorted(set(executables()) - without_ros):
+        assert 'usage' in run_sourced(colcon_workspace, programs / name, '--help').lower()
+
+
+@pytest.mark.packaging
+def test_fly_flies_after_colcon(colcon_workspace):
+    fly = colcon_workspace / 'install' / PACKAGE / 'lib' / PACKAGE / 'fly'
+    # The pip install proves the compiled flight; here it would only be compiled once more.
+    document = run_sourced(colcon_workspace, fly, '--json', NUMBA_DISABLE_JIT='1')
+    assert json.loads(document)['landed'] is True
