@@ -1,0 +1,33 @@
+"""Errors that this package raises on purpose; each carries one line that a user can act on."""
+
+import reprlib
+
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel = 2
+_SHORT.maxstring = _SHORT.maxother = 60
+
+
+class DiscSimError(Exception):
+    """Base of every error raised on purpose."""
+
+
+class ConfigError(DiscSimError, ValueError):
+    """A value from a user (a flag, a YAML key, a parameter) is not allowed."""
+
+    def __init__(self, thing: str, value: object, allowed: str) -> None:
+        """Name the `thing`, the `value` it had and what is `allowed`."""
+        self.thing = thing
+        self.value = value
+        self.allowed = allowed
+        super().__init__(f'{thing}: {brief(value)} is not allowed; {allowed}')
+
+
+class IntegrationError(DiscSimError, ArithmeticError):
+    """A flight left the range of numbers that the integration can follow."""
+
+
+def brief(value: object) -> str:
+    """Return `value` as one short line, however large, deep or odd it is."""
+    if isinstance(value, float):
+        return f'{value:g}'
+    return ' '.join(_SHORT.repr(value).split())

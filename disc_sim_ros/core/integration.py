@@ -1,0 +1,185 @@
+"""A flight in fixed steps from release to the ground, compiled as a whole."""
+
+import math
+from typing import NamedTuple
+
+from disc_sim_ros.core._jit import entry, inline, jit
+from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.core.equations import Control, Plant, State, Velocity, consistent
+from disc_sim_ros.core.rk4 import between, is_finite, rk4_step
+from disc_sim_ros.core.turbulence import (
+    GustFilter,
+    WindData,
+    first_filter,
+    gust_of,
+    next_filter,
+    wind_at,
+)
+
+FLYING, LANDED, NOT_FINITE = range(3)
+_CROSSING_TOLERANCE = 1e-12  # s; a thousandth of what is promised
+
+
+class Ended(NamedTuple):
+    """How a flight ended: why, when, where, its apex and how many samples were written."""
+
+    status: int  # FLYING (time is up), LANDED or NOT_FINITE (the state is the last finite one)
+    t: float  # s
+    state: State
+    apex_Z: float  # m, least Z (down) on the way
+    samples: int
+
+
+@entry
+def integrate(
+    s: State,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+    wind: WindData,
+    noise: FloatArray,
+    gust_steps: int,
+    step: float,
+    duration: float,
+    ground: bool,
+    sample_rate: float,
+    samples: FloatArray,
+) -> Ended:
+    """Fly until the ground or for `duration`, and write evenly timed samples.
+
+    Args:
+        s: State at release.
+        plant: Constants of the flight.
+        table: Steady coefficients, see `aerodynamics.table_coefficients`.
+        spin_terms: See `aerodynamics.spin_coefficients`.
+        control: Control inputs, held.
+        wind: Wind of the flight.
+        noise: Standard normal numbers, shape (n, 5), a row for each drawn gust; no rows for none.
+        gust_steps: Integration steps from one drawn gust to the next.
+        step: Integration step [s].
+        duration: Longest time of flight [s].
+        ground: End where Z = 0 is crossed from above.
+        sample_rate: Samples per second [1/s].
+        samples: Filled with t, the state and the wind X, Y, Z; shape (n, 18), as many rows as are
+            asked for. A sample inside a step is a shorter step from the same start.
+    """
+    turbulent = len(noise) > 0
+    gusts = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
+    drawn = next_drawn = g = Velocity(0.0, 0.0, 0.0)
+    if turbulent:
+        gusts = first_filter(noise[0])
+        next_drawn = g = gust_of(gusts, s.Z, wind)
+    s = consistent(s, wind_at(s.Z, g, wind), plant, table, spin_terms, control)
+    apex_Z = s.Z
+    written = 0
+    if len(samples) > 0:
+        _write(samples[0], 0.0, s, wind_at(s.Z, g, wind))
+        written = 1
+    k = 0
+    t = 0.0
+    landed = False
+    while t < duration and not landed:
+        h = step
+        next_t = (k + 1) * step
+        if next_t > duration - 1e-9 * step:
+            h = duration - t
+            next_t = duration
+        next_g = g
+        if turbulent:
+            if k % gust_steps == 0:
+                drawn = next_drawn
+                V = _airspeed(s, wind_at(s.Z, drawn, wind))
+                row = min(k // gust_steps + 1, len(noise) - 1)
+                gusts = next_filter(gusts, V, s.Z, gust_steps * step, noise[row])
+                next_drawn = gust_of(gusts, s.Z, wind)
+            next_g = between(drawn, next_drawn, (k % gust_steps + h / step) / gust_steps)
+        next_s = rk4_step(s, h, g, next_g, wind, plant, table, spin_terms, control)
+        if not is_finite(next_s):
+            return Ended(NOT_FINITE, t, s, apex_Z, written)
+        landed = ground and next_s.Z > 0.0
+        if landed:
+            x = _crossing(s, h, next_s.Z, g, next_g, wind, plant, table, spin_terms, control)
+            next_g = between(g, next_g, x / h)
+            next_s = rk4_step(s, x, g, next_g, wind, plant, table, spin_terms, control)
+            h = x
+            next_t = t + x
+
+        while written < len(samples) and written / sample_rate <= next_t + 1e-12:
+            x = written / sample_rate - t
+            if x < h * (1.0 - 1e-9):
+                x_g = between(g, next_g, x / h)
+                x_s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
+                _write(samples[written], written / sample_rate, x_s, wind_at(x_s.Z, x_g, wind))
+            else:
+                _write(
+                    samples[written],
+                    written / sample_rate,
+                    next_s,
+                    wind_at(next_s.Z, next_g, wind),
+                )
+            written += 1
+        if s.VZ < 0.0 <= next_s.VZ:
+            x = h * s.VZ / (s.VZ - next_s.VZ)
+            x_g = between(g, next_g, x / h)
+            top = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
+            apex_Z = min(apex_Z, top.Z)
+        apex_Z = min(apex_Z, next_s.Z)
+        s, g, t = next_s, next_g, next_t
+        k += 1
+    return Ended(LANDED if landed else FLYING, t, s, apex_Z, written)
+
+
+@jit
+def _crossing(
+    s: State,
+    h: float,
+    Z_h: float,
+    g: Velocity,
+    next_g: Velocity,
+    wind: WindData,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+) -> float:
+    """Return the time at which Z = 0 within a step that ends at Z_h > 0 (false position).
+
+    A release on the ground is not a landing if the disc rises first: then the way back counts.
+    """
+    a, Z_a = 0.0, s.Z
+    b, Z_b = h, Z_h
+    if Z_a >= 0.0:
+        a = 1e-6 * h
+        a_g = between(g, next_g, a / h)
+        Z_a = rk4_step(s, a, g, a_g, wind, plant, table, spin_terms, control).Z
+        if Z_a >= 0.0:
+            return 0.0
+    for _ in range(100):
+        x = b - Z_b * (b - a) / (Z_b - Z_a)
+        x_g = between(g, next_g, x / h)
+        Z = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control).Z
+        if Z == 0.0 or abs(b - x) < _CROSSING_TOLERANCE:
+            return x
+        if Z * Z_b < 0.0:
+            a, Z_a = b, Z_b
+        else:
+            Z_a = 0.5 * Z_a  # Illinois: the end that stays counts half
+        b, Z_b = x, Z
+    return b
+
+
+@inline
+def _airspeed(s: State, wind: Velocity) -> float:
+    x, y, z = s.VX - wind.X, s.VY - wind.Y, s.VZ - wind.Z
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@inline
+def _write(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
+    row[0] = t
+    for i in range(len(s)):
+        row[1 + i] = s[i]
+    row[-3] = wind.X
+    row[-2] = wind.Y
+    row[-1] = wind.Z

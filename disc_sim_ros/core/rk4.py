@@ -1,0 +1,77 @@
+"""One fixed step of the classic Runge-Kutta method, shared by every flight."""
+
+import math
+
+from disc_sim_ros.core._jit import inline, jit
+from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.core.equations import (
+    Control,
+    Plant,
+    State,
+    Velocity,
+    consistent,
+    derivative,
+)
+from disc_sim_ros.core.turbulence import WindData, wind_at
+
+
+@jit
+def rk4_step(
+    s: State,
+    h: float,
+    gust: Velocity,
+    next_gust: Velocity,
+    wind: WindData,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+) -> State:
+    """Return the state after `h`, while the gust goes straight from `gust` to `next_gust`.
+
+    See `equations.derivative` for the other arguments.
+    """
+    g = gust
+    k = sum_k = derivative(s, wind_at(s.Z, g, wind), plant, table, spin_terms, control)
+    for stage in range(1, 4):
+        a = 1.0 if stage == 3 else 0.5
+        g = between(gust, next_gust, a)
+        x = moved(s, a * h, k)
+        k = derivative(x, wind_at(x.Z, g, wind), plant, table, spin_terms, control)
+        sum_k = moved(sum_k, 1.0 if stage == 3 else 2.0, k)
+    s = moved(s, h / 6.0, sum_k)
+    return consistent(s, wind_at(s.Z, next_gust, wind), plant, table, spin_terms, control)
+
+
+@inline
+def between(a: Velocity, b: Velocity, f: float) -> Velocity:
+    """Return the velocity at the fraction `f` of the way from `a` to `b`."""
+    return Velocity(a.X + f * (b.X - a.X), a.Y + f * (b.Y - a.Y), a.Z + f * (b.Z - a.Z))
+
+
+@inline
+def moved(s: State, h: float, k: State) -> State:
+    """Return s + h k."""
+    return State(
+        s.X + h * k.X,
+        s.Y + h * k.Y,
+        s.Z + h * k.Z,
+        s.VX + h * k.VX,
+        s.VY + h * k.VY,
+        s.VZ + h * k.VZ,
+        s.e0 + h * k.e0,
+        s.e1 + h * k.e1,
+        s.e2 + h * k.e2,
+        s.e3 + h * k.e3,
+        s.p + h * k.p,
+        s.q + h * k.q,
+        s.r + h * k.r,
+        s.sigma + h * k.sigma,
+    )
+
+
+@inline
+def is_finite(s: State) -> bool:
+    """Say whether every number of the state is finite."""
+    total = s.X + s.Y + s.Z + s.VX + s.VY + s.VZ + s.e0 + s.e1 + s.e2 + s.e3
+    return math.isfinite(total + s.p + s.q + s.r + s.sigma)
