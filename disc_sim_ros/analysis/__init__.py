@@ -1,0 +1,1 @@
+"""Metrics, reports and plots of flights, from a simulation or a bag. No ROS."""
