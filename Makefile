@@ -33,7 +33,7 @@ fly: setup ## throw the disc of the paper's Fig. 5 (DISC=wraith THROW='--speed 2
 	@mkdir -p flights
 	@$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW)
 
-bench-flights: setup ## measure flights per second
+bench-flights: setup-test ## measure flights per second
 	@$(BIN)/python benchmarks/flights.py
 
 clean: ## remove .venv, builds and caches; keep flights/ and bags/

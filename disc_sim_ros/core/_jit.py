@@ -90,11 +90,12 @@ def _remove_unused(base: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _source_digest() -> str:
+def source_digest(folder: Path) -> str:
+    """Return a short digest of all Python sources of a folder, and of what compiles them."""
     digest = hashlib.sha256(f'{numba.__version__} {sys.version}'.encode())
-    for path in sorted(Path(__file__).parent.glob('*.py')):
+    for path in sorted(folder.glob('*.py')):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-_SOURCE_DIGEST = _source_digest()
+_SOURCE_DIGEST = source_digest(Path(__file__).parent)

@@ -128,7 +128,11 @@ def euler_from_quaternion(e: ArrayLike) -> FloatArray:
 
 
 def cos_sin_degrees(angle: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle in degrees, exact at multiples of 90 degrees."""
-    quarter, rest = divmod(angle, 90.0)
+    """Return cosine and sine of an angle in degrees, exact at multiples of 90 degrees.
+
+    The sine of the opposite angle is the opposite to the last bit, so that mirrored launches are.
+    """
+    quarter, rest = divmod(abs(angle), 90.0)
     c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
-    return ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
+    c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
+    return c, math.copysign(1.0, angle) * s
