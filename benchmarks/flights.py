@@ -1,0 +1,111 @@
+"""How many flights of the paper's Fig. 5 throw one core flies in a CPU-second, and how exactly.
+
+Each flight is one call of `disc_sim_ros.core.flight.fly`, from the launch to the landing, as any
+program would make it. Errors are of the landing point, against an independent integration with
+a tolerance of 1e-12 (test/reference), and count in the worst of a few launches, not only the one
+that is timed. The last line is the fastest step whose errors all stay below 1 mm.
+
+usage: benchmarks/flights.py
+"""
+
+from dataclasses import asdict
+import math
+import os
+from pathlib import Path
+import platform
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+
+import numba
+import numpy as np
+from reference.cases import FRISBEE
+from reference.reference_flight import reference_flight
+
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.flight import Setup, fly
+from disc_sim_ros.core.launch import Launch
+
+STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 4e-2)  # s
+ALLOWED = 1e-3  # m
+ROUNDS = 7
+ROUND_S = 0.4  # CPU seconds a round
+FIG_5 = Launch()
+NEIGHBOURS = (FIG_5, Launch(speed=15.3), Launch(pitch=14.0), Launch(spin=-31.416, roll=5.0))
+
+
+def main() -> None:
+    """Measure every step and print a table."""
+    if os.environ.get('NUMBA_DISABLE_JIT') == '1':
+        print(time_per_flight(Setup(disc=catalogue.load('frisbee'), step=STEPS[-1]), rounds=3))
+        return
+    disc = catalogue.load('frisbee')
+    landings = [landing_of_reference(launch) for launch in NEIGHBOURS]
+    print(f'{cpu_name()}, {os.cpu_count()} cores; Python {platform.python_version()}, '
+          f'numba {numba.__version__}, numpy {np.__version__}')  # fmt: skip
+    print('step, ms   error of Fig. 5, mm   worst of 4 launches, mm   us/flight   flights/CPU-s')
+    best = (0.0, 0.0, 0.0)
+    for step in STEPS:
+        setup = Setup(disc=disc, step=step)
+        errors = [
+            math.dist(fly(launch, setup).position, landing)
+            for launch, landing in zip(NEIGHBOURS, landings, strict=True)
+        ]
+        seconds = time_per_flight(setup, ROUNDS)
+        print(f'{step * 1e3:8g} {errors[0] * 1e3:21.6f} {max(errors) * 1e3:25.6f} '
+              f'{seconds * 1e6:11.1f} {1 / seconds:15.0f}')  # fmt: skip
+        if max(errors) < ALLOWED:
+            best = max(best, (1 / seconds, step, errors[0]))
+    rate, step, error = best
+    slower = plain_python_time() * rate
+    print(f'plain Python (NUMBA_DISABLE_JIT=1, steps of {STEPS[-1] * 1e3:g} ms): '
+          f'{slower:.0f} times slower than the line below')  # fmt: skip
+    print(f'{rate:.0f} flights per CPU-second on one core at a step of {step * 1e3:g} ms, '
+          f'ending {error * 1e3:.3f} mm from the 1e-12 reference')  # fmt: skip
+
+
+def time_per_flight(setup: Setup, rounds: int) -> float:
+    """Return the CPU seconds of one flight, in the best of a few rounds."""
+    fly(FIG_5, setup)
+    start = time.process_time()
+    fly(FIG_5, setup)
+    count = max(1, round(ROUND_S / max(time.process_time() - start, 1e-5)))
+    best = math.inf
+    for _ in range(rounds):
+        start = time.process_time()
+        for _ in range(count):
+            fly(FIG_5, setup)
+        best = min(best, (time.process_time() - start) / count)
+    return best
+
+
+def landing_of_reference(launch: Launch) -> list[float]:
+    """Return where the independent integration lands [m], in map."""
+    thrown = asdict(launch)
+    thrown['alpha'] = thrown.pop('angle_of_attack')
+    return list(reference_flight(FRISBEE, thrown)['landing_position_m'])
+
+
+def plain_python_time() -> float:
+    """Return the CPU seconds of one flight without numba, measured in a process of its own."""
+    environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
+    done = subprocess.run(  # noqa: S603 - this very file
+        [sys.executable, __file__], env=environment, capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+def cpu_name() -> str:
+    """Return what /proc calls the processor, or what Python knows."""
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+    except OSError:
+        return platform.processor()
+    names = (line.split(':', 1)[1].strip() for line in lines if line.startswith('model name'))
+    return next(names, platform.processor())
+
+
+if __name__ == '__main__':
+    main()
