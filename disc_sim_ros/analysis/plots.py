@@ -1,6 +1,7 @@
 """Plots of one flight: the two views and the time histories of the paper's Fig. 5."""
 
 from io import BytesIO
+import warnings
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -51,7 +52,8 @@ def flight_figure(flight: Flight) -> Figure:
     figure.suptitle(
         f'{flight.setup.disc.name}, {flight.setup.model} model: {launch.speed:g} m/s, '
         f'pitch {launch.pitch:g}, roll {launch.roll:g} degrees, spin {launch.spin:g} rad/s; '
-        f'{flight.range:.1f} m in {flight.time:.2f} s'
+        f'{flight.range:.1f} m in {flight.time:.2f} s',
+        parse_math=False,  # a file may have dollars in its name
     )
     return figure
 
@@ -59,5 +61,8 @@ def flight_figure(flight: Flight) -> Figure:
 def image(figure: Figure, kind: str) -> bytes:
     """Return a figure as the bytes of a file of the `kind` 'png', 'svg' or 'pdf'."""
     buffer = BytesIO()
-    figure.savefig(buffer, format=kind, dpi=120)
+    with warnings.catch_warnings():
+        # The name of a disc in a script that the font lacks shows as boxes, and that is enough.
+        warnings.filterwarnings('ignore', message='Glyph .* missing from font')
+        figure.savefig(buffer, format=kind, dpi=120)
     return buffer.getvalue()

@@ -118,8 +118,15 @@ def summary(flight: Flight) -> str:
         f'{launch.height:g} m up',
         f'  spin    {launch.spin:g} rad/s, {turns} from above{ratio}',
     ]
+    if any((launch.sideslip, launch.roll_rate, launch.pitch_rate)):
+        lines.append(
+            f'  also    sideslip {launch.sideslip:g} degrees, roll rate {launch.roll_rate:g}, '
+            f'pitch rate {launch.pitch_rate:g} rad/s'
+        )
     if np.any(wind != 0.0):
         lines.append(f'  wind    {wind[0]:g} {wind[1]:g} {wind[2]:g} m/s (forward, left, up)')
+    if setup.wind.turbulence:
+        lines.append(f'  gusts   {setup.wind.turbulence:g} m/s at 6 m, seed {setup.wind.seed}')
     control = flight.control
     if any((control.C_L, control.C_M, control.C_N)):
         lines.append(f'  control C_L {control.C_L:g}, C_M {control.C_M:g}, C_N {control.C_N:g}')

@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Callable
 import re
-import sys
 from typing import Any, NoReturn
 
 from disc_sim_ros.core import check
@@ -25,8 +24,14 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with code 2 and one line on stderr."""
         text = ' '.join(message.removeprefix('argument ').split())
-        sys.stderr.write(f'{self.prog}: error: {text}\n')
-        sys.exit(2)
+        self.exit(2, f'{self.prog}: error: {text}\n')
+
+    def _match_argument(self, action: argparse.Action, arg_strings_pattern: str) -> int:
+        """Say also what a flag without its value is for, which holds the allowed range."""
+        try:
+            return super()._match_argument(action, arg_strings_pattern)
+        except argparse.ArgumentError as error:
+            raise argparse.ArgumentError(action, f'{error.message}; {action.help}') from None
 
 
 def number(lowest: float, highest: float, unit: str) -> Callable[[str], float]:
@@ -34,7 +39,7 @@ def number(lowest: float, highest: float, unit: str) -> Callable[[str], float]:
 
     def convert(text: str) -> float:
         try:
-            value: float | str = float(text)
+            value: float | str = text if '_' in text else float(text)  # not 1_5 for 1.5
         except ValueError:
             value = text
         try:

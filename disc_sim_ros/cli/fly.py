@@ -3,6 +3,7 @@
 import argparse
 import json
 from pathlib import Path
+import signal
 import sys
 
 from disc_sim_ros import __version__
@@ -147,11 +148,11 @@ def parser() -> Parser:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run `fly`; return its exit code: 0, 1 for a failed flight, 2 for bad input."""
+    output.mend_streams()
     p = parser()
     chosen = p.parse_args(arguments)
     try:
-        with output.quiet_pipe():
-            return _run(chosen)
+        _run(chosen)
     except ConfigError as error:
         thing = _FLAG_OF.get(error.thing, error.thing)
         if thing == '--spin' and hasattr(chosen, 'advance_ratio'):
@@ -160,9 +161,12 @@ def main(arguments: list[str] | None = None) -> int:
     except DiscSimError as error:
         sys.stderr.write(f'fly: error: {error}\n')
         return 1
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    return 0
 
 
-def _run(chosen: argparse.Namespace) -> int:
+def _run(chosen: argparse.Namespace) -> None:
     csv, plot = getattr(chosen, 'csv', None), getattr(chosen, 'plot', None)
     if csv is not None:
         output.check_writable('--csv', csv)
@@ -175,24 +179,24 @@ def _run(chosen: argparse.Namespace) -> int:
 
     found = _fly(chosen, rate)
     # Reports and plots are imported where they are needed: matplotlib takes half a second.
-    from disc_sim_ros.analysis import report
+    from disc_sim_ros.analysis import report  # noqa: PLC0415
 
     if chosen.json:
-        print(json.dumps(report.document(found), allow_nan=False))
-        return 0
-    print(report.summary(found))
+        output.show(json.dumps(report.document(found), allow_nan=False))
+        return
+    lines = [report.summary(found)]
     if csv is not None:
         output.write_whole('--csv', csv, report.csv_text(found.trajectory).encode())
-        print(f'  wrote   {csv}, {len(found.trajectory)} rows')
+        lines.append(f'  wrote   {csv}, {len(found.trajectory)} rows')
     elif plot is not None:
-        from disc_sim_ros.analysis import plots
+        from disc_sim_ros.analysis import plots  # noqa: PLC0415
 
         figure = plots.flight_figure(found)
         output.write_whole('--plot', plot, plots.image(figure, _ending(plot)))
-        print(f'  wrote   {plot}')
+        lines.append(f'  wrote   {plot}')
     elif rate > 0.0:
-        print(report.samples_text(found.trajectory))
-    return 0
+        lines.append(report.samples_text(found.trajectory))
+    output.show('\n'.join(lines))
 
 
 def _fly(chosen: argparse.Namespace, rate: float) -> flight.Flight:
@@ -204,8 +208,9 @@ def _fly(chosen: argparse.Namespace, rate: float) -> flight.Flight:
         spin = derived.spin_rate(chosen.advance_ratio, disc.diameter, chosen.speed)
     values = {field: getattr(chosen, _dest(flag)) for flag, field, _, _ in _LAUNCH_FLAGS}
     thrown = launch.Launch(spin=spin, **values)
-    if chosen.model == 'precession' and (thrown.roll_rate or thrown.pitch_rate):
-        _note('--roll-rate and --pitch-rate change nothing: the precession model sets both itself')
+    ground = not chosen.no_ground
+    if ground and thrown.height < 0.0:
+        raise ConfigError('--height', thrown.height, 'give 0 m or above, or --no-ground')
     setup = flight.Setup(
         disc=disc,
         model=chosen.model,
@@ -219,16 +224,20 @@ def _fly(chosen: argparse.Namespace, rate: float) -> flight.Flight:
         ),
         step=chosen.step,
     )
+    setup.check_step(thrown.spin)  # before any note: what is refused says one line
+    if chosen.model == 'precession' and (thrown.roll_rate or thrown.pitch_rate):
+        _note('--roll-rate and --pitch-rate change nothing: the precession model sets both itself')
     if not flight.is_ready():
         _note('compiling the equations of motion, once on this machine, about 10 s')
-    return flight.fly(
-        thrown,
-        setup,
-        control=Control(*chosen.control),
-        duration=chosen.duration,
-        ground=not chosen.no_ground,
-        sample_rate=rate,
-    )
+    with output.ended_by_ctrl_c():
+        return flight.fly(
+            thrown,
+            setup,
+            control=Control(*chosen.control),
+            duration=chosen.duration,
+            ground=ground,
+            sample_rate=rate,
+        )
 
 
 def _add_number(

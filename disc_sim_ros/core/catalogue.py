@@ -20,7 +20,8 @@ from disc_sim_ros.core.disc import AeroTable, Disc, LinearAero, SpinTable
 from disc_sim_ros.core.errors import ConfigError, brief
 
 _FOLDER = files('disc_sim_ros.core') / 'discs'
-_LARGEST_FILE = 1 << 20  # bytes; the largest disc of the package has 4 kB
+_LONGEST_NAME = 100  # of a file, in a message
+_LARGEST_FILE = 1 << 17  # bytes; the largest disc of the package has 4 kB, and 1 MB takes seconds
 
 _PROPERTIES = {
     'mass_kg': 'mass',
@@ -76,7 +77,9 @@ def load(name_or_file: str) -> Disc:
     """
     path = Path(name_or_file)
     if path.suffix in {'.yaml', '.yml'}:
-        return _disc(path.stem, _merged(_read(name_or_file, path)), name_or_file)
+        source = _shown(name_or_file)
+        name = path.stem.encode(errors='replace').decode()  # what is no text cannot be drawn
+        return _disc(name, _merged(_read(name_or_file, path), source), source)
     return _disc(name_or_file, _entry(name_or_file), name_or_file)
 
 
@@ -87,10 +90,10 @@ def _entry(name: str) -> dict[str, Any]:
         guess = f'did you mean {close[0]}? ' if close else ''
         allowed = f'{guess}choose from {", ".join(names())} or give a .yaml file'
         raise ConfigError('disc', name, allowed)
-    return _merged(_parse(name, (_FOLDER / f'{name}.yaml').read_text(encoding='utf-8')))
+    return _merged(_parse(name, (_FOLDER / f'{name}.yaml').read_text(encoding='utf-8')), name)
 
 
-def _merged(keys: dict[str, Any]) -> dict[str, Any]:
+def _merged(keys: dict[str, Any], source: str) -> dict[str, Any]:
     """Return `keys` over those of the disc that it is based on; sections are merged by key.
 
     Tables replace each other whole: half a table of one disc and half of another is none.
@@ -98,7 +101,7 @@ def _merged(keys: dict[str, Any]) -> dict[str, Any]:
     base_name = keys.pop('based_on', None)
     if base_name is None:
         return keys
-    base = _entry(check.choice('based_on', base_name, names()))
+    base = _entry(check.choice(f'{source}: based_on', base_name, names()))
     for key, value in keys.items():
         if key in {'damping', 'linear'} and isinstance(value, dict):
             base[key] = {**base.get(key, {}), **value}
@@ -109,24 +112,38 @@ def _merged(keys: dict[str, Any]) -> dict[str, Any]:
 
 def _read(name: str, path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            size = f'{path.stat().st_size} bytes'
-            raise ConfigError(name, size, f'a disc file has at most {_LARGEST_FILE} bytes')
-        text = path.read_text(encoding='utf-8')
+        if path.exists() and not path.is_file():  # a pipe would wait, a device may never end
+            raise OSError(0, 'not a file')
+        with path.open('rb') as file:
+            content = file.read(_LARGEST_FILE + 1)
     except OSError as error:
         raise ConfigError('disc', name, f'cannot read it ({error.strerror})') from None
+    except ValueError as error:  # a name with a zero byte
+        raise ConfigError('disc', name, f'cannot read it ({error})') from None
+    if len(content) > _LARGEST_FILE:
+        raise ConfigError('disc', name, f'a disc file has at most {_LARGEST_FILE} bytes')
+    try:
+        text = content.decode('utf-8-sig')
     except UnicodeDecodeError:
         raise ConfigError('disc', name, 'the file is not UTF-8 text') from None
-    return _parse(name, text)
+    return _parse(_shown(name), text)
+
+
+def _shown(name: str) -> str:
+    """Return the name of a file for a message: one line, of a long one the end."""
+    text = name if name.isprintable() else repr(name)[1:-1]
+    return text if len(text) <= _LONGEST_NAME else f'...{text[-_LONGEST_NAME:]}'
 
 
 def _parse(name: str, text: str) -> dict[str, Any]:
     try:
-        keys = yaml.load(text, Loader=_StrictLoader)
+        keys = yaml.load(text, Loader=_StrictLoader)  # noqa: S506 - a SafeLoader
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         mark = getattr(error, 'problem_mark', None)
         where = f' line {mark.line + 1}' if mark is not None else ''
-        problem = getattr(error, 'problem', None) or brief(str(error))
+        problem = getattr(error, 'problem', None) or getattr(error, 'reason', None) or str(error)
+        if isinstance(error, RecursionError):
+            problem = 'lists or keys nested too deep'
         raise ConfigError(f'{name}{where}', problem, 'the file must be valid YAML') from None
     if not isinstance(keys, dict):
         raise ConfigError(name, keys, 'the file must hold keys and values')
@@ -155,7 +172,9 @@ def _disc(name: str, keys: dict[str, Any], source: str) -> Disc:
         raise ConfigError(f'{source}: {thing}', error.value, error.allowed) from None
 
 
-_YAML_KEYS = {attribute: key for key, attribute in _PROPERTIES.items()}
+_YAML_KEYS = {attribute: key for key, attribute in _PROPERTIES.items()} | {
+    attribute: f'damping.{key}' for key, attribute in _DAMPING.items()
+}
 
 
 def _section(section: str, values: object, fields: Mapping[str, str]) -> dict[str, Any]:
@@ -172,7 +191,8 @@ def _section(section: str, values: object, fields: Mapping[str, str]) -> dict[st
             return renamed
         return {section: _BUILDERS[section](**renamed)}
     except ConfigError as error:
-        raise ConfigError(f'{section}.{error.thing}', error.value, error.allowed) from None
+        key = next((k for k, attribute in fields.items() if attribute == error.thing), error.thing)
+        raise ConfigError(f'{section}.{key}', error.value, error.allowed) from None
 
 
 def _refuse_unknown(
@@ -193,17 +213,20 @@ def _require(values: Mapping[str, Any], needed: Mapping[str, str], prefix: str) 
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """A safe loader that refuses doubled keys and reads 1e-3 as the number it is."""
+    """A safe loader that refuses doubled and merged keys and has one kind of number, decimal.
+
+    Merge keys of merge keys grow without bound, and `based_on` does what they are for.
+    """
 
     def construct_mapping(
         self,
         node: yaml.MappingNode,
-        deep: bool = False,
+        deep: bool = False,  # noqa: FBT002
     ) -> dict[Any, Any]:
         seen = set()
         for key_node, _ in node.value:
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
-            if key is None or key in seen:
+            if key is None or key in seen or key == '<<':
                 problem = 'a doubled key' if key in seen else 'a key that is no word'
                 raise yaml.constructor.ConstructorError(
                     None, None, f'{problem} {key or ""}'.strip(), key_node.start_mark
@@ -212,9 +235,14 @@ class _StrictLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-# YAML 1.1 wants a dot and a signed exponent in a float and reads 1e-3 as text; YAML 1.2 does not.
+# PyYAML follows YAML 1.1, which reads 1e-3 as text, -045 as -37 and 1:30 as 90; YAML 1.2 does not.
+_NUMBERS = {'tag:yaml.org,2002:float', 'tag:yaml.org,2002:int'}
+_StrictLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
 _StrictLoader.add_implicit_resolver(
     'tag:yaml.org,2002:float',
-    re.compile(r'^[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?$'),
+    re.compile(r'^([-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?\.inf|\.nan)$', re.IGNORECASE),
     list('-+0123456789.'),
 )

@@ -33,13 +33,14 @@ def number(
         ConfigError: The value is no number, not finite or out of range.
     """
     allowed = _range_text(lowest, highest, above, unit)
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if isinstance(value, bool) or not isinstance(value, int | Real):
         raise ConfigError(thing, value, allowed)
     try:
         x = float(value)
     except OverflowError:
         raise ConfigError(thing, value, allowed) from None
-    if not (math.isfinite(x) and lowest <= x <= highest) or (above is not None and x <= above):
+    exact = value if isinstance(value, int) else x  # above 2^53 no float is the whole number
+    if not (math.isfinite(x) and lowest <= exact <= highest) or (above is not None and x <= above):
         raise ConfigError(thing, value, allowed)
     return x
 
@@ -52,10 +53,11 @@ def choice(thing: str, value: object, allowed: Collection[str]) -> str:
 
 
 def text(thing: str, value: object) -> str:
-    """Return `value` if it is text."""
-    if not isinstance(value, str):
-        raise ConfigError(thing, value, 'give a text')
-    return value
+    """Return a text as one line that is safe to show on a terminal."""
+    line = ' '.join(value.split()) if isinstance(value, str) else None
+    if line is None or not line.isprintable():
+        raise ConfigError(thing, value, 'give a text without control characters')
+    return line
 
 
 def column(thing: str, values: object, *, least: int = 2) -> NDArray[np.float64]:

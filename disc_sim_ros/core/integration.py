@@ -20,6 +20,17 @@ FLYING, LANDED, NOT_FINITE = range(3)
 _CROSSING_TOLERANCE = 1e-12  # s; a thousandth of what is promised
 
 
+class Progress(NamedTuple):
+    """A flight between two steps: all that the next one needs."""
+
+    k: int  # steps done
+    state: State
+    gust: Velocity  # at the disc, now
+    filters: GustFilter
+    drawn: Velocity  # the gusts at both ends of the present interval
+    next_drawn: Velocity
+
+
 class Ended(NamedTuple):
     """How a flight ended: why, when, where, its apex and how many samples were written."""
 
@@ -28,6 +39,53 @@ class Ended(NamedTuple):
     state: State
     apex_Z: float  # m, least Z (down) on the way
     samples: int
+
+
+@jit
+def begin(
+    s: State,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+    wind: WindData,
+    noise: FloatArray,
+) -> Progress:
+    """Return a flight at its release; see `integrate` for the arguments."""
+    filters = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
+    gust = Velocity(0.0, 0.0, 0.0)
+    if len(noise) > 0:
+        filters = first_filter(noise[0])
+        gust = gust_of(filters, s.Z, wind)
+    s = consistent(s, wind_at(s.Z, gust, wind), plant, table, spin_terms, control)
+    return Progress(0, s, gust, filters, gust, gust)
+
+
+@inline
+def advance(
+    p: Progress,
+    h: float,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+    wind: WindData,
+    noise: FloatArray,
+    gust_steps: int,
+    step: float,
+) -> Progress:
+    """Return a flight one step further: `h` is `step`, or less for the last one."""
+    gust, filters, drawn, next_drawn = p.gust, p.filters, p.drawn, p.next_drawn
+    if len(noise) > 0:
+        if p.k % gust_steps == 0:
+            drawn = next_drawn
+            V = _airspeed(p.state, wind_at(p.state.Z, drawn, wind))
+            row = min(p.k // gust_steps + 1, len(noise) - 1)
+            filters = next_filter(filters, V, p.state.Z, gust_steps * step, noise[row])
+            next_drawn = gust_of(filters, p.state.Z, wind)
+        gust = between(drawn, next_drawn, (p.k % gust_steps + h / step) / gust_steps)
+    s = rk4_step(p.state, h, p.gust, gust, wind, plant, table, spin_terms, control)
+    return Progress(p.k + 1, s, gust, filters, drawn, next_drawn)
 
 
 @entry
@@ -64,42 +122,28 @@ def integrate(
         samples: Filled with t, the state and the wind X, Y, Z; shape (n, 18), as many rows as are
             asked for. A sample inside a step is a shorter step from the same start.
     """
-    turbulent = len(noise) > 0
-    gusts = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
-    drawn = next_drawn = g = Velocity(0.0, 0.0, 0.0)
-    if turbulent:
-        gusts = first_filter(noise[0])
-        next_drawn = g = gust_of(gusts, s.Z, wind)
-    s = consistent(s, wind_at(s.Z, g, wind), plant, table, spin_terms, control)
+    p = begin(s, plant, table, spin_terms, control, wind, noise)
     apex_Z = s.Z
     written = 0
     if len(samples) > 0:
-        _write(samples[0], 0.0, s, wind_at(s.Z, g, wind))
+        _write(samples[0], 0.0, p.state, wind_at(s.Z, p.gust, wind))
         written = 1
-    k = 0
     t = 0.0
     landed = False
     while t < duration and not landed:
+        s, g = p.state, p.gust
         h = step
-        next_t = (k + 1) * step
+        next_t = (p.k + 1) * step
         if next_t > duration - 1e-9 * step:
             h = duration - t
             next_t = duration
-        next_g = g
-        if turbulent:
-            if k % gust_steps == 0:
-                drawn = next_drawn
-                V = _airspeed(s, wind_at(s.Z, drawn, wind))
-                row = min(k // gust_steps + 1, len(noise) - 1)
-                gusts = next_filter(gusts, V, s.Z, gust_steps * step, noise[row])
-                next_drawn = gust_of(gusts, s.Z, wind)
-            next_g = between(drawn, next_drawn, (k % gust_steps + h / step) / gust_steps)
-        next_s = rk4_step(s, h, g, next_g, wind, plant, table, spin_terms, control)
+        p = advance(p, h, plant, table, spin_terms, control, wind, noise, gust_steps, step)
+        next_s, next_g = p.state, p.gust
         if not is_finite(next_s):
             return Ended(NOT_FINITE, t, s, apex_Z, written)
         landed = ground and next_s.Z > 0.0
         if landed:
-            x = _crossing(s, h, next_s.Z, g, next_g, wind, plant, table, spin_terms, control)
+            x = crossing(s, h, next_s.Z, g, next_g, wind, plant, table, spin_terms, control)
             next_g = between(g, next_g, x / h)
             next_s = rk4_step(s, x, g, next_g, wind, plant, table, spin_terms, control)
             h = x
@@ -112,12 +156,8 @@ def integrate(
                 x_s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
                 _write(samples[written], written / sample_rate, x_s, wind_at(x_s.Z, x_g, wind))
             else:
-                _write(
-                    samples[written],
-                    written / sample_rate,
-                    next_s,
-                    wind_at(next_s.Z, next_g, wind),
-                )
+                z_wind = wind_at(next_s.Z, next_g, wind)
+                _write(samples[written], written / sample_rate, next_s, z_wind)
             written += 1
         if s.VZ < 0.0 <= next_s.VZ:
             x = h * s.VZ / (s.VZ - next_s.VZ)
@@ -125,13 +165,12 @@ def integrate(
             top = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
             apex_Z = min(apex_Z, top.Z)
         apex_Z = min(apex_Z, next_s.Z)
-        s, g, t = next_s, next_g, next_t
-        k += 1
+        s, t = next_s, next_t
     return Ended(LANDED if landed else FLYING, t, s, apex_Z, written)
 
 
 @jit
-def _crossing(
+def crossing(
     s: State,
     h: float,
     Z_h: float,

@@ -93,7 +93,7 @@ def test_side_force_due_to_spin_pushes_to_the_side():
 
 
 def test_rolling_moment_due_to_spin_precesses_the_nose():
-    """C_L > 0 with positive spin pitches the nose up, q = L / (r I_z); both signs turn for both."""
+    """C_L > 0 with positive spin pitches the nose up, q = L / (r I_z)."""
     disc = dataclasses.replace(
         FRISBEE, spin_roll_moment=spin_table(0.05), aero='linear',
         linear=dataclasses.replace(FRISBEE.linear, CM_0=0.0, CM_alpha=0.0),

@@ -21,7 +21,7 @@ from disc_sim_ros.core.equations import (
     precession_rates,
 )
 from disc_sim_ros.core.errors import ConfigError, IntegrationError
-from disc_sim_ros.core.flight import MODELS, Setup, fly
+from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
 
 WOBBLING = Launch(speed=14.0, pitch=20.0, spin=50.0, roll_rate=3.0, pitch_rate=1.0, height=2.0)

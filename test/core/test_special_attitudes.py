@@ -140,7 +140,7 @@ def test_no_airspeed_in_wind_is_no_special_case():
 
 @pytest.mark.parametrize('alpha', [90.0, -90.0])
 def test_damping_and_commands_hold_where_the_flow_has_no_direction(alpha):
-    """Flat side first a wobble still dies, and a rolling command still acts: about the disc's x."""
+    """Flat side first a wobble still dies, and a command acts about the disc's own x."""
     launch = Launch(speed=15.0, pitch=0.0, angle_of_attack=alpha, spin=40.0, roll_rate=2.0)
     t = free(launch, 0.3, setup=Setup(disc=FRISBEE, air=Air(gravity=0.0)))
     wobble = np.hypot(t.rates[:, 0], t.rates[:, 1])
