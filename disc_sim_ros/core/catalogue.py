@@ -112,10 +112,7 @@ def _merged(keys: dict[str, Any], source: str) -> dict[str, Any]:
 
 def _read(name: str, path: Path) -> dict[str, Any]:
     try:
-        if path.exists() and not path.is_file():  # a pipe would wait, a device may never end
-            raise OSError(0, 'not a file')
-        with path.open('rb') as file:
-            content = file.read(_LARGEST_FILE + 1)
+        content = _head(path)
     except OSError as error:
         raise ConfigError('disc', name, f'cannot read it ({error.strerror})') from None
     except ValueError as error:  # a name with a zero byte
@@ -127,6 +124,14 @@ def _read(name: str, path: Path) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise ConfigError('disc', name, 'the file is not UTF-8 text') from None
     return _parse(_shown(name), text)
+
+
+def _head(path: Path) -> bytes:
+    """Return the bytes of a file, of a large one only as many as show that it is too large."""
+    if path.exists() and not path.is_file():  # a pipe would wait, a device may never end
+        raise OSError(0, 'not a file')
+    with path.open('rb') as file:
+        return file.read(_LARGEST_FILE + 1)
 
 
 def _shown(name: str) -> str:

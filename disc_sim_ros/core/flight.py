@@ -112,23 +112,18 @@ class Setup:
         x_X, x_Y = (X / horizontal, Y / horizontal) if horizontal > 0.0 else (1.0, 0.0)
         return WindData(X, Y, Z, z0, per_log, float(wind.turbulence), x_X, x_Y)
 
-    @property
-    def gust_steps(self) -> int:
-        """Return how many integration steps there are from one drawn gust to the next."""
-        return max(1, round(GUST_INTERVAL / self.step))
-
     def noise(self, duration: float) -> FloatArray:
         """Return the normal numbers that draw the gusts of a flight; none without turbulence."""
         if self.wind.turbulence == 0.0:
-            return _NO_NOISE
-        rows = math.ceil(duration / (self.gust_steps * self.step)) + 2
+            return NO_NOISE
+        rows = math.ceil(duration / GUST_INTERVAL) + 3
         generator = np.random.Generator(np.random.Philox(int(self.wind.seed)))
         return generator.standard_normal((rows, NOISE_COLUMNS))
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A flight that has ended. Positions are in the paper's earth axes, of the disc's centre.
+    """A flight that has ended; `position`, `drift` and `apex` are for people, in `map` axes.
 
     Attributes:
         landed: Whether it reached the ground; otherwise its time was up in the air.
@@ -205,10 +200,9 @@ def fly(
         setup.plant,
         setup.disc.table_rows,
         setup.disc.spin_terms,
-        _checked(control),
+        checked_control(control),
         setup.wind_data,
         setup.noise(duration),
-        setup.gust_steps,
         float(setup.step),
         float(duration),
         ground,
@@ -243,7 +237,7 @@ def _line(disc: Disc) -> Linear:
     return Linear(*(float(getattr(line, name)) for name in Linear._fields))
 
 
-def _checked(control: Control) -> Control:
+def checked_control(control: Control) -> Control:
     """Return the control inputs as finite floats of a sensible size."""
 
     def within(name: str, limit: float, unit: str) -> float:
@@ -261,4 +255,4 @@ def _checked(control: Control) -> Control:
     )
 
 
-_NO_NOISE = np.empty((0, NOISE_COLUMNS))
+NO_NOISE = np.empty((0, NOISE_COLUMNS))

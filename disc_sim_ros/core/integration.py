@@ -5,9 +5,21 @@ from typing import NamedTuple
 
 from disc_sim_ros.core._jit import entry, inline, jit
 from disc_sim_ros.core.disc import FloatArray
-from disc_sim_ros.core.equations import Control, Plant, State, Velocity, consistent
+from disc_sim_ros.core.equations import (
+    Control,
+    Plant,
+    State,
+    Velocity,
+    coefficients,
+    consistent,
+    derivative,
+    flow,
+    force,
+    moment,
+)
 from disc_sim_ros.core.rk4 import between, is_finite, rk4_step
 from disc_sim_ros.core.turbulence import (
+    GUST_INTERVAL,
     GustFilter,
     WindData,
     first_filter,
@@ -26,9 +38,10 @@ class Progress(NamedTuple):
     k: int  # steps done
     state: State
     gust: Velocity  # at the disc, now
-    filters: GustFilter
+    filters: GustFilter  # that drew `next_drawn`
     drawn: Velocity  # the gusts at both ends of the present interval
     next_drawn: Velocity
+    interval: int  # its number, from 0
 
 
 class Ended(NamedTuple):
@@ -52,13 +65,16 @@ def begin(
     noise: FloatArray,
 ) -> Progress:
     """Return a flight at its release; see `integrate` for the arguments."""
+    gust = next_drawn = Velocity(0.0, 0.0, 0.0)
     filters = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
-    gust = Velocity(0.0, 0.0, 0.0)
     if len(noise) > 0:
         filters = first_filter(noise[0])
         gust = gust_of(filters, s.Z, wind)
+        V = _airspeed(s, wind_at(s.Z, gust, wind))
+        filters = next_filter(filters, V, s.Z, GUST_INTERVAL, noise[1])
+        next_drawn = gust_of(filters, s.Z, wind)
     s = consistent(s, wind_at(s.Z, gust, wind), plant, table, spin_terms, control)
-    return Progress(0, s, gust, filters, gust, gust)
+    return Progress(0, s, gust, filters, gust, next_drawn, 0)
 
 
 @inline
@@ -71,21 +87,22 @@ def advance(
     control: Control,
     wind: WindData,
     noise: FloatArray,
-    gust_steps: int,
     step: float,
 ) -> Progress:
     """Return a flight one step further: `h` is `step`, or less for the last one."""
-    gust, filters, drawn, next_drawn = p.gust, p.filters, p.drawn, p.next_drawn
+    s = p.state
+    gust, filters, drawn, next_drawn, i = p.gust, p.filters, p.drawn, p.next_drawn, p.interval
     if len(noise) > 0:
-        if p.k % gust_steps == 0:
+        t = p.k * step
+        while t / GUST_INTERVAL > i + 1 - 1e-9:  # once for a step that divides the interval
+            i += 1
             drawn = next_drawn
-            V = _airspeed(p.state, wind_at(p.state.Z, drawn, wind))
-            row = min(p.k // gust_steps + 1, len(noise) - 1)
-            filters = next_filter(filters, V, p.state.Z, gust_steps * step, noise[row])
-            next_drawn = gust_of(filters, p.state.Z, wind)
-        gust = between(drawn, next_drawn, (p.k % gust_steps + h / step) / gust_steps)
-    s = rk4_step(p.state, h, p.gust, gust, wind, plant, table, spin_terms, control)
-    return Progress(p.k + 1, s, gust, filters, drawn, next_drawn)
+            V = _airspeed(s, wind_at(s.Z, p.gust, wind))
+            filters = next_filter(filters, V, s.Z, GUST_INTERVAL, noise[i + 1])
+            next_drawn = gust_of(filters, s.Z, wind)
+        gust = between(drawn, next_drawn, min((t + h) / GUST_INTERVAL - i, 1.0))
+    s = rk4_step(s, h, p.gust, gust, wind, plant, table, spin_terms, control)
+    return Progress(p.k + 1, s, gust, filters, drawn, next_drawn, i)
 
 
 @entry
@@ -97,7 +114,6 @@ def integrate(
     control: Control,
     wind: WindData,
     noise: FloatArray,
-    gust_steps: int,
     step: float,
     duration: float,
     ground: bool,
@@ -114,7 +130,6 @@ def integrate(
         control: Control inputs, held.
         wind: Wind of the flight.
         noise: Standard normal numbers, shape (n, 5), a row for each drawn gust; no rows for none.
-        gust_steps: Integration steps from one drawn gust to the next.
         step: Integration step [s].
         duration: Longest time of flight [s].
         ground: End where Z = 0 is crossed from above.
@@ -135,9 +150,10 @@ def integrate(
         h = step
         next_t = (p.k + 1) * step
         if next_t > duration - 1e-9 * step:
-            h = duration - t
+            if next_t > duration + 1e-9 * step:
+                h = duration - t
             next_t = duration
-        p = advance(p, h, plant, table, spin_terms, control, wind, noise, gust_steps, step)
+        p = advance(p, h, plant, table, spin_terms, control, wind, noise, step)
         next_s, next_g = p.state, p.gust
         if not is_finite(next_s):
             return Ended(NOT_FINITE, t, s, apex_Z, written)
@@ -222,3 +238,87 @@ def _write(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
     row[-3] = wind.X
     row[-2] = wind.Y
     row[-1] = wind.Z
+
+
+class Advanced(NamedTuple):
+    """Where a flight is after some steps, and why they ended."""
+
+    status: int  # FLYING (all steps done), LANDED or NOT_FINITE
+    progress: Progress  # after the last whole step in the finite numbers and above the ground
+    touch_t: float  # s after release, of the landing
+    touch: State  # at the landing
+
+
+@entry
+def run(
+    p: Progress,
+    steps: int,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+    wind: WindData,
+    noise: FloatArray,
+    step: float,
+    ground: bool,
+) -> Advanced:
+    """Fly some whole `steps` on, or to the ground; see `integrate` for the other arguments.
+
+    Of a flight at its release, k = 0, only the state counts.
+    """
+    if p.k == 0:
+        p = begin(p.state, plant, table, spin_terms, control, wind, noise)
+    for _ in range(steps):
+        s, g = p.state, p.gust
+        after = advance(p, step, plant, table, spin_terms, control, wind, noise, step)
+        if not is_finite(after.state):
+            return Advanced(NOT_FINITE, p, p.k * step, s)
+        if ground and after.state.Z > 0.0:
+            Z = after.state.Z
+            next_g = after.gust
+            x = crossing(s, step, Z, g, next_g, wind, plant, table, spin_terms, control)
+            x_g = between(g, next_g, x / step)
+            s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
+            return Advanced(LANDED, p, p.k * step + x, s)
+        p = after
+    return Advanced(FLYING, p, p.k * step, p.state)
+
+
+class Observed(NamedTuple):
+    """Rates of change of a flight, and the aerodynamic loads behind them."""
+
+    VX_dot: float  # acceleration of the centre, earth axes 1 [m/s^2]
+    VY_dot: float
+    VZ_dot: float
+    p_dot: float  # despun axes 2 [rad/s^2]
+    q_dot: float
+    r_dot: float
+    X: float  # aerodynamic force, despun axes 2 [N]
+    Y: float
+    Z: float
+    L: float  # aerodynamic moment with damping and control coefficients, despun axes 2 [N m]
+    M: float
+    N: float
+
+
+@entry
+def observe(
+    s: State,
+    gust: Velocity,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+    wind: WindData,
+) -> Observed:
+    """Return what acts on the disc right now; see `integrate` for the arguments."""
+    here = wind_at(s.Z, gust, wind)
+    d = derivative(s, here, plant, table, spin_terms, control)
+    a = flow(s, here)
+    C = coefficients(a, s.r, plant, table, spin_terms)
+    X, Y, Z = force(a, C, plant)
+    only_air = Control(control.C_L, control.C_M, control.C_N, 0.0, 0.0, 0.0, control.axes)
+    m = moment(a, s, C, plant, only_air)
+    L = m.L + m.D_xx * s.p + m.D_xy * s.q
+    M = m.M + m.D_xy * s.p + m.D_yy * s.q
+    return Observed(d.VX, d.VY, d.VZ, d.p, d.q, d.r, X, Y, Z, L, M, m.N)

@@ -1,0 +1,169 @@
+"""A flight that is flown step by step and steered on the way: the one mutable object of `core`."""
+
+from dataclasses import replace
+import math
+
+import numpy as np
+
+from disc_sim_ros.core import integration
+from disc_sim_ros.core._jit import is_compiled
+from disc_sim_ros.core.air import Wind
+from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.core.equations import Control, State, Velocity
+from disc_sim_ros.core.errors import ConfigError, IntegrationError
+from disc_sim_ros.core.flight import NO_CONTROL, NO_NOISE, Setup, checked_control
+from disc_sim_ros.core.integration import LANDED, NOT_FINITE, Progress
+from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS, GustFilter, wind_at
+
+_STILL = Velocity(0.0, 0.0, 0.0)
+_NO_FILTERS = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
+_FIRST_GUSTS = 1000  # drawn at first; the store doubles when a flight outlasts it
+
+
+class FlightSimulator:
+    """Flies one disc in whole steps, the same steps to the bit that `flight.fly` makes.
+
+    Commands and wind change between steps and hold from the next one on. After a landing the disc
+    lies where it fell, and steps only pass time.
+
+    Attributes:
+        setup: What flies, in what; its wind is the present one.
+        ground: Whether the flight ends where z = 0 is crossed from above.
+        steps: Steps since the release, also after the landing.
+        landed: Whether the disc lies on the ground.
+        touch_time: Time of the landing since the release [s].
+        touch: State at the landing, before the disc came to rest.
+    """
+
+    def __init__(self, setup: Setup, release: State, *, ground: bool = True) -> None:
+        """Let a disc go; see `Launch.state`.
+
+        Raises:
+            ConfigError: A release underground, or a step too long for the spin.
+        """
+        setup.check_step(release.r)
+        if ground and release.Z > 0.0:
+            raise ConfigError('height', -release.Z, 'with ground, release at 0 m or above')
+        self.setup = setup
+        self.ground = ground
+        self.release = release
+        self.steps = 0
+        self.landed = False
+        self.touch_time = math.inf
+        self._control = NO_CONTROL
+        self._progress = Progress(0, release, _STILL, _NO_FILTERS, _STILL, _STILL, 0)
+        self._random = np.random.Generator(np.random.Philox(int(setup.wind.seed)))
+        self._noise = NO_NOISE
+        self._state = release
+        self.touch = release
+        self.advance(0)  # completes the state: gust, and p and q of the precession model
+
+    @property
+    def state(self) -> State:
+        """Return the present state."""
+        return self._state
+
+    @property
+    def time(self) -> float:
+        """Return the time since the release [s]."""
+        return self.steps * self.setup.step
+
+    @property
+    def wind(self) -> Velocity:
+        """Return the wind at the disc, gusts included, earth axes 1."""
+        return wind_at_disc(self._state, self._progress.gust, self.setup)
+
+    def observe(self) -> integration.Observed:
+        """Return the rates of change and the aerodynamic force and moment right now.
+
+        All are 0 for a disc that lies on the ground, which carries it.
+        """
+        if self.landed:
+            return integration.Observed(*(0.0,) * 12)
+        setup = self.setup
+        return integration.observe(
+            self._state,
+            self._progress.gust,
+            setup.plant,
+            setup.disc.table_rows,
+            setup.disc.spin_terms,
+            self._control,
+            setup.wind_data,
+        )
+
+    @property
+    def control(self) -> Control:
+        """Return the control inputs that hold from the next step on."""
+        return self._control
+
+    @control.setter
+    def control(self, control: Control) -> None:
+        self._control = checked_control(control)
+
+    def set_wind(self, wind: Wind) -> None:
+        """Change the wind from the next step on; a change of the seed counts at the next release.
+
+        Raises:
+            ConfigError: Turbulence would start or end in mid-flight.
+        """
+        if (wind.turbulence > 0.0) != (self.setup.wind.turbulence > 0.0) and self.steps > 0:
+            raise ConfigError('turbulence', wind.turbulence, 'it starts or ends at a release')
+        seed = self.setup.wind.seed
+        self.setup = replace(self.setup, wind=replace(wind, seed=seed))
+
+    def advance(self, steps: int) -> None:
+        """Fly some steps on.
+
+        Raises:
+            IntegrationError: The state would have left the finite numbers; it stays at the last
+                finite one.
+        """
+        if self.landed:
+            self.steps += steps
+            return
+        setup = self.setup
+        done = integration.run(
+            self._progress,
+            steps,
+            setup.plant,
+            setup.disc.table_rows,
+            setup.disc.spin_terms,
+            self._control,
+            setup.wind_data,
+            self._noise_until(self.steps + steps),
+            float(setup.step),
+            self.ground,
+        )
+        self._progress = done.progress
+        self._state = done.progress.state
+        if done.status == NOT_FINITE:
+            message = f'the flight left the finite numbers at t = {done.touch_t:.6g} s'
+            raise IntegrationError(message)
+        self.steps += steps
+        if done.status == LANDED:
+            self.landed = True
+            self.touch_time = done.touch_t
+            # At rest where it touched: no velocity, no rates, the attitude as it was.
+            self.touch = done.touch
+            self._state = done.touch._replace(Z=0.0, VX=0.0, VY=0.0, VZ=0.0, p=0.0, q=0.0, r=0.0)
+
+    def _noise_until(self, step: int) -> FloatArray:
+        """Return gust noise for all steps up to `step`, the same numbers that `fly` draws."""
+        if self.setup.wind.turbulence == 0.0:
+            return NO_NOISE
+        rows = math.ceil(step * self.setup.step / GUST_INTERVAL) + 3
+        while len(self._noise) < rows:
+            more = max(_FIRST_GUSTS, len(self._noise))
+            noise = self._random.standard_normal((more, NOISE_COLUMNS))
+            self._noise = np.concatenate([self._noise, noise])
+        return self._noise
+
+
+def wind_at_disc(state: State, gust: Velocity, setup: Setup) -> Velocity:
+    """Return the wind where the disc is, gust included, earth axes 1."""
+    return wind_at(state.Z, gust, setup.wind_data)
+
+
+def is_ready() -> bool:
+    """Say whether stepping needs no compilation first."""
+    return is_compiled(integration.run)
