@@ -12,10 +12,10 @@ from disc_sim_ros.core.flight import Flight
 BLUE, ORANGE = '#0072b2', '#d55e00'  # Okabe and Ito: safe for colour-blind readers
 _HISTORIES = (
     ('airspeed_m_s', 'airspeed, m/s'),
-    ('alpha_deg', 'angle of attack, degrees'),
-    ('roll_deg', 'roll, degrees'),
-    ('pitch_deg', 'pitch, degrees'),
-    ('absolute_attitude_deg', 'absolute attitude, degrees'),
+    ('alpha_deg', 'angle of attack, °'),
+    ('roll_deg', 'roll, °'),
+    ('pitch_deg', 'pitch, °'),
+    ('absolute_attitude_deg', 'absolute attitude, °'),
     ('spin_rad_s', 'spin, rad/s'),
 )
 
@@ -51,7 +51,7 @@ def flight_figure(flight: Flight) -> Figure:
     launch = flight.launch
     figure.suptitle(
         f'{flight.setup.disc.name}, {flight.setup.model} model: {launch.speed:g} m/s, '
-        f'pitch {launch.pitch:g}, roll {launch.roll:g} degrees, spin {launch.spin:g} rad/s; '
+        f'pitch {launch.pitch:g}°, roll {launch.roll:g}°, spin {launch.spin:g} rad/s; '
         f'{flight.range:.1f} m in {flight.time:.2f} s',
         parse_math=False,  # a file may have dollars in its name
     )
