@@ -3,7 +3,8 @@
 The paper's axes are earth axes 1 (X forward, Y right, Z down) and body axes 2 (x forward, y right,
 z down through the underside). REP-103 has x forward, y left, z up for both. Each pair differs by
 half a turn about x, so that vectors change the sign of y and z, and so does the vector part of a
-quaternion. This is the only module that crosses from one to the other.
+quaternion. Here that is defined; `nodes.conversions` does the same in scalars, for speed, and is
+tested against this module.
 
 Quaternions are written scalar first, (e0, e1, e2, e3), in the paper's axes ("Euler parameters"),
 and x, y, z, w in messages. They take body components to earth components.
@@ -35,6 +36,12 @@ def map_from_paper(vector: ArrayLike) -> FloatArray:
 def paper_from_map(vector: ArrayLike) -> FloatArray:
     """Return vectors in the paper's axes from REP-103 axes, shape (..., 3)."""
     return map_from_paper(vector)
+
+
+def turned(vector: Vector) -> Vector:
+    """Return one vector half a turn about x on: the paper's axes to REP-103, or back."""
+    x, y, z = vector
+    return x, 0.0 - y, 0.0 - z  # no minus zeros
 
 
 def message_quaternion(e: ArrayLike) -> FloatArray:

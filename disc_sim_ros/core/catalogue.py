@@ -83,6 +83,34 @@ def load(name_or_file: str) -> Disc:
     return _disc(name_or_file, _entry(name_or_file), name_or_file)
 
 
+def document(disc: Disc) -> dict[str, Any]:
+    """Return a disc as the keys and values of a disc file, complete and exact.
+
+    `from_document` makes the very same disc of it, to the last bit.
+    """
+    found: dict[str, Any] = {'description': disc.description, 'aero': disc.aero}
+    found |= {key: float(getattr(disc, name)) for key, name in _PROPERTIES.items()}
+    found['damping'] = {key: float(getattr(disc, name)) for key, name in _DAMPING.items()}
+    if disc.linear is not None:
+        found['linear'] = {k: float(getattr(disc.linear, name)) for k, name in _LINEAR.items()}
+    if disc.table is not None:
+        columns = disc.table.coefficients.T.tolist()
+        found['table'] = {
+            'alpha_deg': disc.table.alpha_deg.tolist(),
+            **dict(zip(('CL', 'CD', 'CM'), columns, strict=True)),
+        }
+    for section in ('spin_roll_moment', 'spin_side_force'):
+        terms: SpinTable | None = getattr(disc, section)
+        if terms is not None:
+            found[section] = {key: getattr(terms, key).tolist() for key in _SPIN}
+    return found
+
+
+def from_document(name: str, keys: dict[str, Any]) -> Disc:
+    """Return the disc of a `document`; raises ConfigError as `load` does."""
+    return _disc(name, dict(keys), name)
+
+
 def _entry(name: str) -> dict[str, Any]:
     """Return the keys of a disc of the package, with those of the disc it is based on."""
     if name not in names():

@@ -42,12 +42,17 @@ class AeroTable:
     """Steady coefficients over the angle of attack, linear between the rows.
 
     Attributes:
-        alpha: Angles of attack, ascending, at least -90 to 90 degrees [rad], shape (n,).
+        alpha_deg: Angles of attack, ascending, at least -90 to 90 [degrees], shape (n,).
         coefficients: Columns C_Lift, C_Drag, C_M (nose up positive), shape (n, 3).
     """
 
-    alpha: FloatArray
+    alpha_deg: FloatArray
     coefficients: FloatArray
+
+    @property
+    def alpha(self) -> FloatArray:
+        """Angles of attack [rad], shape (n,)."""
+        return np.radians(self.alpha_deg)
 
     @classmethod
     def of(cls, *, alpha_deg: ArrayLike, CL: ArrayLike, CD: ArrayLike, CM: ArrayLike) -> Self:
@@ -73,7 +78,7 @@ class AeroTable:
             columns.append(column)
         for i, drag in enumerate(columns[1]):
             check.number(f'CD[{i}]', float(drag), 0.0)
-        return cls(np.radians(degrees), np.ascontiguousarray(np.stack(columns, axis=1)))
+        return cls(degrees, np.ascontiguousarray(np.stack(columns, axis=1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,13 +90,18 @@ class SpinTable:
 
     Attributes:
         advance_ratio: r c / (2 V), ascending from 0, shape (m,).
-        alpha: Angles of attack, ascending [rad], shape (n,).
+        alpha_deg: Angles of attack, ascending [degrees], shape (n,).
         coefficient: For a spin clockwise from above, shape (m, n).
     """
 
     advance_ratio: FloatArray
-    alpha: FloatArray
+    alpha_deg: FloatArray
     coefficient: FloatArray
+
+    @property
+    def alpha(self) -> FloatArray:
+        """Angles of attack [rad], shape (n,)."""
+        return np.radians(self.alpha_deg)
 
     @classmethod
     def of(cls, *, advance_ratio: ArrayLike, alpha_deg: ArrayLike, coefficient: object) -> Self:
@@ -112,7 +122,7 @@ class SpinTable:
         if np.any(rows[0] != 0.0):
             allowed = 'without spin there is no coefficient, all must be 0'
             raise ConfigError('coefficient[0]', rows[0].tolist(), allowed)
-        return cls(ratio, np.radians(degrees), np.array(rows))
+        return cls(ratio, degrees, np.array(rows))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from disc_sim_ros.core import integration
+from disc_sim_ros.core import catalogue, integration
 from disc_sim_ros.core._jit import is_compiled
 from disc_sim_ros.core.air import Wind
 from disc_sim_ros.core.disc import FloatArray
@@ -13,10 +13,12 @@ from disc_sim_ros.core.equations import Control, State, Velocity
 from disc_sim_ros.core.errors import ConfigError, IntegrationError
 from disc_sim_ros.core.flight import NO_CONTROL, NO_NOISE, Setup, checked_control
 from disc_sim_ros.core.integration import LANDED, NOT_FINITE, Progress
+from disc_sim_ros.core.launch import Launch
 from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS, GustFilter, wind_at
 
 _STILL = Velocity(0.0, 0.0, 0.0)
 _NO_FILTERS = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
+NOTHING = integration.Observed(*(0.0,) * 12)  # acts on a disc that is held or lies
 _FIRST_GUSTS = 1000  # drawn at first; the store doubles when a flight outlasts it
 
 
@@ -79,7 +81,7 @@ class FlightSimulator:
         All are 0 for a disc that lies on the ground, which carries it.
         """
         if self.landed:
-            return integration.Observed(*(0.0,) * 12)
+            return NOTHING
         setup = self.setup
         return integration.observe(
             self._state,
@@ -167,3 +169,10 @@ def wind_at_disc(state: State, gust: Velocity, setup: Setup) -> Velocity:
 def is_ready() -> bool:
     """Say whether stepping needs no compilation first."""
     return is_compiled(integration.run)
+
+
+def warm_up() -> None:
+    """Load or compile all that a simulator calls, so that no step has to wait for it."""
+    sim = FlightSimulator(Setup(disc=catalogue.load('frisbee')), Launch().state())
+    sim.advance(1)
+    sim.observe()

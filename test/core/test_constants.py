@@ -63,7 +63,7 @@ def test_each_coefficient_of_the_lines_matters(name):
 def test_each_column_of_the_table_matters(column):
     changed = FRISBEE.table.coefficients.copy()
     changed[:, column] *= 1.01
-    disc = dataclasses.replace(FRISBEE, table=AeroTable(FRISBEE.table.alpha, changed))
+    disc = dataclasses.replace(FRISBEE, table=AeroTable(FRISBEE.table.alpha_deg, changed))
     assert np.linalg.norm(landing(disc) - landing(FRISBEE)) > 1e-5
 
 

@@ -1,0 +1,147 @@
+"""What a message costs from the state of the disc to the bytes that are published.
+
+Three ways to the same bytes: a message built afresh and serialised, one message that is kept and
+serialised again, and `nodes.wire.Wire`; `ratio` is fresh to Wire. The second table has what comes
+before in all three: the conversion of the state. CPU time in the best of a few rounds.
+
+usage: benchmarks/messages.py
+"""
+
+from collections.abc import Callable
+import platform
+import time
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64
+
+from disc_sim_ros.core.equations import Velocity
+from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.nodes import conversions
+from disc_sim_ros.nodes.wire import Wire
+
+ROUNDS = 9
+ROUND_S = 0.05  # CPU seconds a round
+STAMP = (1_700_000_000, 123_456_789)
+STATE = Launch().state()
+FRESH: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
+    'Odometry': (lambda: Odometry(child_frame_id='disc'), conversions.ODOMETRY_FIELDS),
+    'PoseStamped': (PoseStamped, conversions.POSE_FIELDS),
+    'TransformStamped': (
+        lambda: TransformStamped(child_frame_id='disc'),
+        conversions.TRANSFORM_FIELDS,
+    ),
+    'JointState': (
+        lambda: JointState(name=['spin'], position=[0.0], velocity=[0.0]),
+        conversions.JOINT_FIELDS,
+    ),
+    'Imu': (Imu, conversions.IMU_FIELDS),
+    'Float64': (Float64, ('data',)),
+}
+
+
+def main() -> None:
+    """Measure all types and print two tables."""
+    print(f'Python {platform.python_version()}; us per message')
+    print(f'{"type":18} {"fresh":>8} {"kept":>8} {"Wire":>8} {"ratio":>8}')
+    for name, (make, fields) in FRESH.items():
+        fresh, kept, wire = (microseconds(way) for way in ways(make, fields))
+        print(f'{name:18} {fresh:8.2f} {kept:8.2f} {wire:8.3f} {fresh / wire:8.0f}')
+
+    print(f'\n{"from the state":32} {"us":>8}')
+    for name, way in {**conversions_alone(), 'odom + pose, to bytes': pair()}.items():
+        print(f'{name:32} {microseconds(way):8.2f}')
+
+
+def ways(make: Callable[[], Any], fields: tuple[str, ...]) -> list[Callable[[], bytes]]:
+    """Return the three ways to the bytes of one type: fresh, kept and `Wire`."""
+    values = tuple(0.1 * i for i in range(len(fields)))
+    stamped = hasattr(make(), 'header')
+    setter = writer(fields, stamped=stamped)
+    message = named(make(), stamped=stamped)
+    pack = Wire(message, fields, ('header.stamp',) if stamped else ()).pack
+
+    def fresh() -> bytes:
+        new = named(make(), stamped=stamped)
+        setter(new, values)
+        return serialize_message(new)
+
+    def kept() -> bytes:
+        setter(message, values)
+        return serialize_message(message)
+
+    return [fresh, kept, lambda: pack(*STAMP, *values)]
+
+
+def named(message: Any, *, stamped: bool) -> Any:
+    """Return the message in `map`."""
+    if stamped:
+        message.header.frame_id = 'map'
+    return message
+
+
+def writer(fields: tuple[str, ...], *, stamped: bool) -> Callable[[Any, tuple[float, ...]], None]:
+    """Return a function with one attribute assignment a field, as one would write it by hand."""
+    lines = [f'    message.{subscripted(path)} = values[{i}]' for i, path in enumerate(fields)]
+    if stamped:
+        lines += [f'    message.header.stamp.sec = {STAMP[0]}']
+        lines += [f'    message.header.stamp.nanosec = {STAMP[1]}']
+    made: dict[str, Any] = {}
+    exec('\n'.join(['def write(message, values):', *lines]), made)  # noqa: S102 - made above
+    return made['write']
+
+
+def subscripted(path: str) -> str:
+    """Return 'position[0]' for 'position.0'."""
+    return ''.join(f'[{n}]' if n.isdigit() else f'.{n}' for n in path.split('.')).lstrip('.')
+
+
+def conversions_alone() -> dict[str, Callable[[], Any]]:
+    """Return the conversions that run at the rate of publication."""
+    still, none = Velocity(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    return {
+        'odometry(state), pose included': lambda: conversions.odometry(STATE),
+        'pose(state)': lambda: conversions.pose(STATE),
+        'spin_joint(state)': lambda: conversions.spin_joint(STATE),
+        'spin_transform(state)': lambda: conversions.spin_transform(STATE),
+        'imu(state, ...)': lambda: conversions.imu(STATE, none, none, none, 9.81),
+        'quantities(state, ...)': lambda: conversions.quantities(STATE, still, 0.275),
+    }
+
+
+def pair() -> Callable[[], Any]:
+    """Return the hot path: one state to the bytes of an Odometry and of a PoseStamped."""
+    odom, pose = (
+        Wire(named(FRESH[name][0](), stamped=True), FRESH[name][1]).pack
+        for name in ('Odometry', 'PoseStamped')
+    )
+
+    def both() -> tuple[bytes, bytes]:
+        values = conversions.odometry(STATE)
+        return odom(*STAMP, *values), pose(*STAMP, *values[:7])
+
+    return both
+
+
+def microseconds(function: Callable[[], Any]) -> float:
+    """Return the CPU time of one call in the best round [us]."""
+    count, seconds = 1, 0.0
+    while seconds < ROUND_S:
+        count *= 2
+        seconds = timed(function, count)
+    return 1e6 / count * min(timed(function, count) for _ in range(ROUNDS))
+
+
+def timed(function: Callable[[], Any], count: int) -> float:
+    """Return the CPU seconds of some calls."""
+    start = time.process_time()
+    for _ in range(count):
+        function()
+    return time.process_time() - start
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,268 @@
+"""What the simulator publishes: message templates filled once, and who listens."""
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import (
+    Point,
+    PoseStamped,
+    TransformStamped,
+    Vector3Stamped,
+    WrenchStamped,
+)
+from nav_msgs.msg import Odometry, Path
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import ColorRGBA, Float64, String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from disc_sim_ros.core import axes
+from disc_sim_ros.core.equations import State
+from disc_sim_ros.nodes import conversions, topics
+from disc_sim_ros.nodes.conversions import Quantities, Six, stamp
+from disc_sim_ros.nodes.wire import Wire
+
+try:  # not among the wheels on PyPI
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
+
+LONGEST_PATH = 2000  # points; the oldest go first
+SECTORS = 24
+RIM_HEIGHT = 0.12  # of the diameter
+_BLUE = ColorRGBA(r=0.0, g=0.447, b=0.698, a=1.0)
+_WHITE = ColorRGBA(r=0.95, g=0.95, b=0.95, a=1.0)
+_ORANGE = ColorRGBA(r=0.835, g=0.369, b=0.0, a=1.0)
+
+
+class Channel:
+    """One topic and whether anybody listens, which costs nothing to ask.
+
+    Attributes:
+        heard: Whether the topic has a subscriber.
+    """
+
+    def __init__(
+        self, node: Node, kind: type, name: str, qos: QoSProfile, wire: Wire | None = None
+    ) -> None:
+        self.heard = False
+        self.publisher: Publisher = node.create_publisher(
+            kind,
+            name,
+            qos,
+            event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._pack = wire.pack if wire is not None else None
+        self._publish = self.publisher.publish
+
+    def send(self, seconds: int, nanoseconds: int, *values: float) -> None:
+        """Publish the patched template."""
+        self._publish(self._pack(seconds, nanoseconds, *values))  # type: ignore[misc]
+
+    def publish(self, message: Any) -> None:
+        """Publish a message that was built whole."""
+        self._publish(message)
+
+    def _on_matched(self, status: Any) -> None:
+        self.heard = status.current_count > 0
+
+
+class Outputs:
+    """All topics of one simulator."""
+
+    def __init__(  # noqa: PLR0915 - a list of topics
+        self, node: Node, frames: topics.Frames, *, with_clock: bool
+    ) -> None:
+        """Create the publishers and fill the templates."""
+        self.frames = frames
+        self._name = node.get_fully_qualified_name()[1:]
+        self._frame_of = {kind: name for name, kind in conversions.moment_axes(frames).items()}
+        map_, disc, body = frames.map, frames.disc, frames.disc_body
+
+        def channel(name: str, message: Any, floats: tuple[str, ...] = (), **more: Any) -> Channel:
+            qos = more.pop('qos', topics.STATE_QOS)
+            wire = Wire(message, floats, **more) if floats or more else None
+            return Channel(node, type(message), name, qos, wire)
+
+        odometry = Odometry(child_frame_id=disc)
+        odometry.header.frame_id = map_
+        self.odom = channel(topics.ODOM, odometry, conversions.ODOMETRY_FIELDS)
+        pose = PoseStamped()
+        pose.header.frame_id = map_
+        self.pose = channel(topics.POSE, pose, conversions.POSE_FIELDS)
+        tilt = TransformStamped(child_frame_id=disc)
+        tilt.header.frame_id = map_
+        self.transform = channel(topics.TRANSFORM, tilt, conversions.TRANSFORM_FIELDS)
+        turn = TransformStamped(child_frame_id=body)
+        turn.header.frame_id = disc
+        self._turn = Wire(turn, conversions.SPIN_TRANSFORM_FIELDS)
+        joint = JointState(name=[topics.SPIN_JOINT], position=[0.0], velocity=[0.0])
+        self.joint_states = channel(topics.JOINT_STATES, joint, conversions.JOINT_FIELDS)
+        self.imu = channel(topics.IMU, _imu_template(body), conversions.IMU_FIELDS)
+        wrench = WrenchStamped()
+        wrench.header.frame_id = disc
+        self.aero_wrench = channel(topics.AERO_WRENCH, wrench, conversions.WRENCH_FIELDS)
+        self.quantities = tuple(
+            channel(name, Float64(), ('data',), stamps=()) for name in Quantities._fields
+        )
+        self.tf = None
+        if TFMessage is not None:
+            both = TFMessage(transforms=[tilt, turn])
+            first = tuple(f'transforms.0.{path}' for path in conversions.TRANSFORM_FIELDS)
+            second = tuple(f'transforms.1.{path}' for path in conversions.SPIN_TRANSFORM_FIELDS)
+            stamps = ('transforms.0.header.stamp', 'transforms.1.header.stamp')
+            self.tf = channel(topics.TF, both, first + second, stamps=stamps)
+        self.clock = None
+        if with_clock:
+            self.clock = channel(topics.CLOCK, Clock(), stamps=('clock',), qos=topics.CLOCK_QOS)
+        self.path = Channel(node, Path, topics.PATH, topics.STATE_QOS)
+        self._path = Path()
+        self._path.header.frame_id = map_
+        self.markers = Channel(node, MarkerArray, topics.MARKERS, topics.LATCHED_QOS)
+        self.events = Channel(node, DiagnosticStatus, topics.FLIGHT_EVENTS, topics.STATE_QOS)
+        self.configuration = Channel(node, String, topics.CONFIGURATION, topics.LATCHED_QOS)
+        self.release = Channel(node, Odometry, topics.RELEASE, topics.LATCHED_QOS)
+        self._release = Wire(odometry, conversions.ODOMETRY_FIELDS)
+        self.applied_moment = Channel(node, WrenchStamped, topics.APPLIED_MOMENT, topics.STATE_QOS)
+        coefficients = Vector3Stamped()
+        coefficients.header.frame_id = frames.disc_air
+        self.applied_coefficients = channel(
+            topics.APPLIED_COEFFICIENTS, coefficients, conversions.VECTOR_FIELDS
+        )
+        wind = Vector3Stamped()
+        wind.header.frame_id = map_
+        self.applied_wind = channel(topics.APPLIED_WIND, wind, conversions.VECTOR_FIELDS)
+
+    def motion(self, nanoseconds: int, s: State) -> None:
+        """Publish where the disc is and how it moves, to whoever listens."""
+        sec, ns = stamp(nanoseconds)
+        if self.clock is not None:
+            self.clock.send(sec, ns)
+        if self.odom.heard:
+            values = conversions.odometry(s)
+            self.odom.send(sec, ns, *values)
+            if self.pose.heard:
+                self.pose.send(sec, ns, *values[:7])
+        elif self.pose.heard:
+            self.pose.send(sec, ns, *conversions.pose(s))
+        if self.transform.heard:
+            self.transform.send(sec, ns, *conversions.pose(s))
+            turn = self._turn.pack(sec, ns, *conversions.spin_transform(s))
+            self.transform.publish(turn)
+        if self.tf is not None and self.tf.heard:
+            self.tf.send(sec, ns, *conversions.pose(s), *conversions.spin_transform(s))
+        if self.joint_states.heard:
+            self.joint_states.send(sec, ns, *conversions.spin_joint(s))
+
+    @property
+    def quantities_heard(self) -> bool:
+        """Say whether anybody listens to a quantity that the paper plots."""
+        return any(channel.heard for channel in self.quantities)
+
+    def quantities_of(self, found: Quantities) -> None:
+        """Publish the quantities that the paper plots, to whoever listens."""
+        for channel, value in zip(self.quantities, found, strict=True):
+            if channel.heard:
+                channel.send(0, 0, value)
+
+    def measured(self, nanoseconds: int, reading: Six) -> None:
+        """Publish an IMU reading in `disc_body`: rad/s, then m/s^2."""
+        self.imu.send(*stamp(nanoseconds), *reading)
+
+    def loads(self, nanoseconds: int, wrench: Six) -> None:
+        """Publish the aerodynamic force [N] and moment [N m] in `disc`."""
+        self.aero_wrench.send(*stamp(nanoseconds), *wrench)
+
+    def begin_path(self) -> None:
+        """Forget the trace."""
+        self._path.poses = []
+
+    def extend_path(self, nanoseconds: int, s: State) -> None:
+        """Add the present pose to the trace, and publish it to whoever listens."""
+        point = PoseStamped()
+        point.header.frame_id = self.frames.map
+        point.header.stamp.sec, point.header.stamp.nanosec = stamp(nanoseconds)
+        at, turn = point.pose.position, point.pose.orientation
+        at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w = conversions.pose(s)
+        self._path.poses.append(point)
+        del self._path.poses[:-LONGEST_PATH]
+        if self.path.heard:
+            self._path.header.stamp = point.header.stamp
+            self.path.publish(self._path)
+
+    def released(self, nanoseconds: int, s: State, configuration: str, diameter: float) -> None:
+        """Publish what a re-flight starts from, and the disc to look at."""
+        values = conversions.odometry(s)
+        self.release.publish(self._release.pack(*stamp(nanoseconds), *values))
+        self.configuration.publish(String(data=configuration))
+        self.markers.publish(_disc_markers(self.frames.disc_body, diameter))
+
+    def event(
+        self, name: str, text: str, values: Mapping[str, object], *, bad: bool = False
+    ) -> None:
+        """Publish something that happened once."""
+        self.events.publish(
+            DiagnosticStatus(
+                level=DiagnosticStatus.ERROR if bad else DiagnosticStatus.OK,
+                name=f'{self._name}: {name}',
+                message=text,
+                hardware_id=self.frames.disc,
+                values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+            )
+        )
+
+    def moment_applied(self, nanoseconds: int, moment: tuple[float, float, float, int]) -> None:
+        """Publish a moment that acts from a time on: L, M, N in the paper's signs, their axes."""
+        L, M, N, axes_of_moment = moment
+        message = WrenchStamped()
+        message.header.frame_id = self._frame_of[axes_of_moment]
+        message.header.stamp.sec, message.header.stamp.nanosec = stamp(nanoseconds)
+        torque = message.wrench.torque
+        torque.x, torque.y, torque.z = axes.turned((L, M, N))
+        self.applied_moment.publish(message)
+
+    def coefficients_applied(self, nanoseconds: int, values: tuple[float, ...]) -> None:
+        """Publish coefficients that act from a time on, in the paper's signs."""
+        self.applied_coefficients.send(*stamp(nanoseconds), *values)
+
+    def wind_applied(self, nanoseconds: int, mean: Sequence[float]) -> None:
+        """Publish a mean wind in `map` that blows from a time on [m/s]."""
+        self.applied_wind.send(*stamp(nanoseconds), *mean)
+
+
+def _imu_template(frame: str) -> Imu:
+    """Return a message that says it reports no orientation (REP-145)."""
+    message = Imu()
+    message.header.frame_id = frame
+    message.orientation_covariance[0] = -1.0
+    return message
+
+
+def _disc_markers(frame: str, diameter: float) -> MarkerArray:
+    """Return the disc as coloured sectors with a rim, so that its spin can be seen."""
+    r, h = 0.5 * diameter, 0.5 * RIM_HEIGHT * diameter
+    marker = Marker(type=Marker.TRIANGLE_LIST, action=Marker.ADD, ns='disc', frame_locked=True)
+    marker.header.frame_id = frame
+    marker.pose.orientation.w = 1.0
+    marker.scale.x = marker.scale.y = marker.scale.z = 1.0
+    marker.color.a = 1.0
+    for i in range(SECTORS):
+        a, b = (2 * math.pi * j / SECTORS for j in (i, i + 1))
+        colour = _ORANGE if i == 0 else (_BLUE, _WHITE)[i * 4 // SECTORS % 2]
+        top = [Point(x=0.0, y=0.0, z=h)]
+        top += [Point(x=r * math.cos(t), y=r * math.sin(t), z=h) for t in (a, b)]
+        low = [Point(x=p.x, y=p.y, z=-h) for p in top[1:]]
+        under = [top[0], top[2], top[1]]  # seen from below, which is hollow
+        rim = [low[0], low[1], top[2], low[0], top[2], top[1]]
+        for triangle in (top, under, rim):
+            marker.points += triangle
+            marker.colors += [colour] * len(triangle)
+    return MarkerArray(markers=[marker])

@@ -1,0 +1,61 @@
+"""Which steps are due by the steady clock: absolute deadlines, catching up, slipping."""
+
+import math
+
+CATCH_UP = 0.1  # s of wall time whose steps are made up for after a stall
+
+
+class Pacer:
+    """Counts steps against the steady clock; knows nothing of what a step is.
+
+    Deadlines are absolute, so that no lateness adds up. After a stall of more than `CATCH_UP` the
+    rest of it is given up: the simulation then runs behind the wall clock by that much.
+
+    Attributes:
+        slipped: Wall time given up so far [s].
+        slips: How often.
+        missed: Deadlines met later than one step, so far.
+        worst: Greatest lateness since `take_worst` was last called [s].
+    """
+
+    def __init__(self, step: float, rate: float, now: float) -> None:
+        """Start counting at `now` [s] for steps of `step` [s] at `rate` times real time."""
+        self.slipped = 0.0
+        self.slips = 0
+        self.missed = 0
+        self.worst = 0.0
+        self.restart(step, rate, now)
+
+    def restart(self, step: float, rate: float, now: float) -> None:
+        """Count anew from `now`: after a pause, a throw or a change of rate."""
+        self._period = step / rate  # s of wall time for a step
+        self._epoch = now
+        self._done = 0
+
+    def due(self, now: float) -> int:
+        """Return how many steps are due at `now`, after giving up what cannot be made up for."""
+        late = now - self._epoch - (self._done + 1) * self._period
+        if late < 0.0:
+            return 0
+        self.worst = max(self.worst, late)
+        if late > self._period:
+            self.missed += 1
+        if late > CATCH_UP:
+            lost = late - CATCH_UP
+            self._epoch += lost
+            self.slipped += lost
+            self.slips += 1
+        return math.floor((now - self._epoch) / self._period + 1e-9) - self._done
+
+    def made(self, steps: int) -> None:
+        """Count steps that were made."""
+        self._done += steps
+
+    def wait(self, now: float, steps: int) -> float:
+        """Return how long to sleep until `steps` more are due [s]."""
+        return self._epoch + (self._done + steps) * self._period - now
+
+    def take_worst(self) -> float:
+        """Return the greatest lateness since the last call [s]."""
+        worst, self.worst = self.worst, 0.0
+        return worst

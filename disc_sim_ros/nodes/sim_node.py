@@ -1,0 +1,205 @@
+"""`sim_node`: the disc in real time on ROS 2."""
+
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+import rclpy
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import ok, try_shutdown
+from std_srvs.srv import SetBool, Trigger
+
+from disc_sim_ros.core import simulator
+from disc_sim_ros.core.errors import DiscSimError
+from disc_sim_ros.nodes import parameters, topics
+from disc_sim_ros.nodes.commands import Commands
+from disc_sim_ros.nodes.outputs import Outputs
+from disc_sim_ros.nodes.sim_loop import SimLoop
+from disc_sim_ros.nodes.timeline import NANOSECONDS
+
+SERVICE_PATIENCE = 5.0  # s, for the simulation thread to do what a service asks
+DIAGNOSTIC_PERIOD = 1.0  # s
+LATE = 0.01  # s; a worse lateness in a second is a warning
+
+
+class SimNode(Node):
+    """Speaks ROS for a simulation loop; holds no physics.
+
+    Raises:
+        ConfigError: Parameters that are misspelt or impossible together.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Declare parameters, make publishers and subscriptions; `start` starts the loop."""
+        super().__init__('sim_node', **kwargs)
+        parameters.declare(self)
+        config = parameters.configuration(parameters.values(self))
+        frames = topics.Frames.prefixed(config.frame_prefix)
+        self._disc = frames.disc
+        outputs = Outputs(self, frames, with_clock=config.publish_clock)
+        commands = Commands(self, frames)
+        self.loop = SimLoop(config, outputs, commands, first_stamp(config, self), self._warn)
+        self.create_service(Trigger, '~/throw', self._on_throw)
+        self.create_service(Trigger, '~/reset', self._on_reset)
+        self.create_service(Trigger, '~/step', self._on_step)
+        self.create_service(SetBool, '~/pause', self._on_pause)
+        parameters.refuse_unused(self)
+        self.add_pre_set_parameters_callback(parameters.widened)
+        self.add_on_set_parameters_callback(self._on_set)
+        self.add_post_set_parameters_callback(self._after_set)
+        self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, 10)
+        self._since = (time.monotonic(), self.loop.timeline.now)
+        self._dropped_before = 0
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DIAGNOSTIC_PERIOD, self._diagnose, clock=steady)
+
+    def start(self) -> None:
+        """Start the simulation thread."""
+        self.loop.start()
+
+    def stop(self) -> None:
+        """End the simulation thread and wait for it."""
+        self.loop.end()
+        if self.loop.is_alive():
+            self.loop.join()
+
+    # ---- services ----
+
+    def _on_throw(self, _: Any, response: Any) -> Any:
+        return self._do(self.loop.throw, response)
+
+    def _on_reset(self, _: Any, response: Any) -> Any:
+        return self._do(self.loop.reset, response)
+
+    def _on_step(self, _: Any, response: Any) -> Any:
+        return self._do(self.loop.step, response)
+
+    def _on_pause(self, request: Any, response: Any) -> Any:
+        return self._do(self.loop.pause if request.data else self.loop.resume, response)
+
+    def _do(self, action: Any, response: Any) -> Any:
+        """Have the simulation thread act, and tell the caller what came of it."""
+        try:
+            response.message = self.loop.submit(action).result(SERVICE_PATIENCE)
+            response.success = True
+        except FutureTimeoutError:
+            response.message = f'the simulation did not answer within {SERVICE_PATIENCE:g} s'
+        except DiscSimError as error:
+            response.message = str(error)
+        return response
+
+    # ---- parameters ----
+
+    def _on_set(self, changes: list[Parameter]) -> SetParametersResult:
+        reason = parameters.refusal(self, changes)
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    def _after_set(self, _: list[Parameter]) -> None:
+        config = parameters.configuration(parameters.values(self))
+        self.loop.submit(lambda: self.loop.configure(config))
+
+    # ---- diagnostics ----
+
+    def _diagnose(self) -> None:
+        """Publish how the simulation keeps up with the clock, once a second."""
+        loop = self.loop
+        before, stamp_before = self._since
+        now, stamp = time.monotonic(), loop.timeline.now
+        self._since = now, stamp
+        factor = (stamp - stamp_before) / NANOSECONDS / (now - before)
+        worst = loop.pacer.take_worst()
+        dropped = sum(topic.dropped for topic in loop.commands.all)
+        problems = []
+        if worst > LATE:
+            problems.append(f'up to {worst * 1e3:.1f} ms late')
+        if dropped > self._dropped_before:
+            problems.append(f'{dropped - self._dropped_before} commands dropped')
+        self._dropped_before = dropped
+        values = {
+            'paused': loop.paused,
+            'real_time_factor': f'{factor:.4f}',
+            'worst_lateness_s': f'{worst:.6f}',
+            'missed_deadlines': loop.pacer.missed,
+            'slips': loop.pacer.slips,
+            'slipped_s': f'{loop.pacer.slipped:.6f}',
+            'throws': loop.counts.throws,
+            'landings': loop.counts.landings,
+            'failed_flights': loop.counts.failures,
+            'expired_commands': loop.counts.expired,
+            'dropped_commands': dropped,
+        }
+        for topic in loop.commands.all:
+            values[f'{topic.name} accepted'] = topic.accepted
+            values[f'{topic.name} dropped'] = topic.dropped
+            if topic.dropped:
+                values[f'{topic.name} last reason'] = topic.reason
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
+            name=f'{self.get_fully_qualified_name()[1:]}: simulation',
+            message=', '.join(problems) or ('paused' if loop.paused else 'in time'),
+            hardware_id=self._disc,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _warn(self, text: str) -> None:
+        self._logger.warning(text, throttle_duration_sec=1.0)
+
+
+def first_stamp(config: parameters.SimConfig, node: Node) -> int:
+    """Return the first stamp [ns]: the configured one, 0 for who supplies the clock, or now."""
+    if config.start_time >= 0.0:
+        return round(config.start_time * NANOSECONDS)
+    return 0 if config.publish_clock else int(node.get_clock().now().nanoseconds)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until Ctrl-C or SIGTERM; return 0, or 2 for bad parameters."""
+    if not simulator.is_ready():
+        sys.stderr.write(
+            'sim_node: compiling the equations of motion, once on this machine, about 10 s\n'
+        )
+    simulator.warm_up()
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = SimNode()
+    except (DiscSimError, ParameterException) as error:
+        sys.stderr.write(f'sim_node: error: {error}\n')
+        try_shutdown()
+        return 2
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    node.start()
+    try:
+        while not ended.is_set() and node.loop.is_alive():
+            executor.spin_once(0.5)
+    except RCLError:
+        if ok():
+            raise
+    finally:
+        node.stop()
+        executor.shutdown()
+        node.destroy_node()
+        try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
