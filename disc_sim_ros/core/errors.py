@@ -29,5 +29,5 @@ class IntegrationError(DiscSimError, ArithmeticError):
 def brief(value: object) -> str:
     """Return `value` as one short line, however large, deep or odd it is."""
     if isinstance(value, float):
-        return f'{value:g}'
+        return f'{value:.12g}'
     return ' '.join(_SHORT.repr(value).split())

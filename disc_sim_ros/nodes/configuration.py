@@ -9,7 +9,7 @@ from disc_sim_ros import __version__
 from disc_sim_ros.core import axes, catalogue
 from disc_sim_ros.core.equations import State
 from disc_sim_ros.core.flight import Setup
-from disc_sim_ros.nodes.parameters import SimConfig
+from disc_sim_ros.nodes.sim_config import SimConfig
 
 
 def configuration_text(config: SimConfig, setup: Setup, release: State, flight: int) -> str:

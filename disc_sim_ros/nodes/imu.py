@@ -5,7 +5,7 @@ import numpy as np
 from disc_sim_ros.core.axes import Vector
 from disc_sim_ros.core.disc import FloatArray
 from disc_sim_ros.nodes.conversions import Six
-from disc_sim_ros.nodes.parameters import ImuConfig
+from disc_sim_ros.nodes.sim_config import ImuConfig
 
 _BLOCK = 1024  # samples drawn at once
 

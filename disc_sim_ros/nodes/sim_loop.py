@@ -20,8 +20,8 @@ from disc_sim_ros.nodes.configuration import configuration_text
 from disc_sim_ros.nodes.imu import ImuErrors
 from disc_sim_ros.nodes.outputs import Outputs
 from disc_sim_ros.nodes.pacer import Pacer
-from disc_sim_ros.nodes.parameters import SimConfig
 from disc_sim_ros.nodes.punctual import make_punctual
+from disc_sim_ros.nodes.sim_config import SimConfig
 from disc_sim_ros.nodes.timeline import NANOSECONDS, Timeline
 
 LONGEST_SLEEP = 0.01  # s; requests are served at least this often

@@ -26,6 +26,7 @@ from disc_sim_ros.core.errors import DiscSimError
 from disc_sim_ros.nodes import parameters, topics
 from disc_sim_ros.nodes.commands import Commands
 from disc_sim_ros.nodes.outputs import Outputs
+from disc_sim_ros.nodes.sim_config import SimConfig, configuration
 from disc_sim_ros.nodes.sim_loop import SimLoop
 from disc_sim_ros.nodes.timeline import NANOSECONDS
 
@@ -45,7 +46,7 @@ class SimNode(Node):
         """Declare parameters, make publishers and subscriptions; `start` starts the loop."""
         super().__init__('sim_node', **kwargs)
         parameters.declare(self)
-        config = parameters.configuration(parameters.values(self))
+        config = configuration(parameters.values(self))
         frames = topics.Frames.prefixed(config.frame_prefix)
         self._disc = frames.disc
         outputs = Outputs(self, frames, with_clock=config.publish_clock)
@@ -107,7 +108,7 @@ class SimNode(Node):
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _after_set(self, _: list[Parameter]) -> None:
-        config = parameters.configuration(parameters.values(self))
+        config = configuration(parameters.values(self))
         self.loop.submit(lambda: self.loop.configure(config))
 
     # ---- diagnostics ----
@@ -160,7 +161,7 @@ class SimNode(Node):
         self._logger.warning(text, throttle_duration_sec=1.0)
 
 
-def first_stamp(config: parameters.SimConfig, node: Node) -> int:
+def first_stamp(config: SimConfig, node: Node) -> int:
     """Return the first stamp [ns]: the configured one, 0 for who supplies the clock, or now."""
     if config.start_time >= 0.0:
         return round(config.start_time * NANOSECONDS)

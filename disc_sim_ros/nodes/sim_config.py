@@ -1,0 +1,258 @@
+"""What the parameters of sim_node mean together: checked as a whole, without ROS."""
+
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+import difflib
+from functools import lru_cache
+import math
+from pathlib import Path
+import re
+from typing import Any
+
+from disc_sim_ros.core import axes, catalogue, check
+from disc_sim_ros.core.air import Air, Wind
+from disc_sim_ros.core.disc import Disc
+from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros.core.flight import Setup
+from disc_sim_ros.core.launch import LIMITS, Launch
+from disc_sim_ros.nodes.parameter_table import (
+    PREFIX_RULE,
+    TABLE,
+    Entry,
+    Value,
+    allowed_text,
+    words,
+)
+
+_FRAME_PREFIX = re.compile(r'([A-Za-z]\w*/)*([A-Za-z]\w*)?', re.ASCII)
+_INTEGER_RATIO = 1e-9  # relative; how far physics_rate / publish_rate may be from a whole number
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ImuConfig:
+    """The IMU: where it sits and how it errs. Axes are those of `disc_body`."""
+
+    offset: tuple[float, ...]  # m, shape (3,), from the centre of mass
+    accelerometer_noise: float  # m/s^2, standard deviation of a sample
+    gyroscope_noise: float  # rad/s, standard deviation of a sample
+    accelerometer_bias: tuple[float, ...]  # m/s^2, shape (3,)
+    gyroscope_bias: tuple[float, ...]  # rad/s, shape (3,)
+    seed: int
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SimConfig:
+    """What sim_node shall do: all its parameters, checked together. Rates are in Hz, times in s.
+
+    Attributes:
+        setup: The disc, the model, the air and the step 1 / `physics_rate`.
+        launch: The release.
+        physics_rate: Integration steps a second.
+        publish_rate: Messages of a state topic a second.
+        steps_per_publish: `physics_rate` / `publish_rate`.
+        real_time_factor: Simulated seconds a second; 0 is as fast as possible.
+        publish_clock: Whether the node supplies `/clock`.
+        start_time: First stamp; negative for the wall clock, or for 0 with `publish_clock`.
+        command_timeout: Simulated time after which a command falls to zero.
+        auto_throw: Whether the node throws without being asked.
+        throw_period: From release to release; 0 is one throw.
+        ground: Whether a flight ends where z = 0 is crossed.
+        frame_prefix: What stands before the names of the frames.
+        path_rate: Points of `path` a second; 0 is none.
+        realtime_priority: SCHED_FIFO priority of the simulation thread; 0 is none.
+        imu: The IMU.
+    """
+
+    setup: Setup
+    launch: Launch
+    physics_rate: float
+    publish_rate: float
+    steps_per_publish: int
+    real_time_factor: float
+    publish_clock: bool
+    start_time: float
+    command_timeout: float
+    auto_throw: bool
+    throw_period: float
+    ground: bool
+    frame_prefix: str
+    path_rate: float
+    realtime_priority: int
+    imu: ImuConfig
+
+
+def checked(values: Mapping[str, object], table: Sequence[Entry] = TABLE) -> dict[str, Any]:
+    """Return a value for every parameter, each in its own range: those given, else defaults.
+
+    Raises:
+        ConfigError: A name that is not in the table, a wrong type or a value out of range.
+    """
+    names = [entry.name for entry in table]
+    for name, value in values.items():
+        if name not in names:
+            raise ConfigError(name, value, no_such(name, names))
+    return {entry.name: _clean(entry, values.get(entry.name, entry.default)) for entry in table}
+
+
+def configuration(values: Mapping[str, object]) -> SimConfig:
+    """Return what the parameters mean together; those that are not given have their defaults.
+
+    Raises:
+        ConfigError: A value is not allowed, or not together with the others; its `thing` is the
+            name of the parameter.
+    """
+    v = checked(values)
+    try:
+        return _configuration(v)
+    except ConfigError as error:
+        raise _in_ros_words(error, v) from None
+
+
+def no_such(name: str, names: Sequence[str]) -> str:
+    """Return that there is no parameter of this name, and which may be meant."""
+    tails = [known for known in names if known.endswith(f'.{name}')]
+    close = tails or difflib.get_close_matches(name, names, n=1)
+    guess = f', did you mean {" or ".join(close)}?' if close else ''
+    return f'there is no such parameter{guess}'
+
+
+def _clean(entry: Entry, value: object) -> Value:
+    """Return a value as the type of the parameter; a whole number is a double where one is due."""
+    name = entry.name
+    match entry.default:
+        case bool() if isinstance(value, bool):
+            return value
+        case bool():
+            raise ConfigError(name, value, 'give true or false')
+        case int():
+            return _whole_number(entry, value)
+        case float():
+            return check.number(name, value, entry.lowest, entry.highest, unit=entry.unit)
+        case str():
+            return _text(entry, value)
+    return _numbers(entry, value, len(entry.default))
+
+
+def _whole_number(entry: Entry, value: object) -> int:
+    match value:
+        case bool():
+            pass
+        case int() if entry.lowest <= value <= entry.highest:
+            return value
+    raise ConfigError(entry.name, value, f'give a whole number from {allowed_text(entry)}')
+
+
+def _text(entry: Entry, value: object) -> str:
+    if not isinstance(value, str):
+        raise ConfigError(entry.name, value, 'give a text')
+    if entry.choices and value not in entry.choices:
+        raise ConfigError(entry.name, value, f'choose from {words(entry.choices)}')
+    return value
+
+
+def _numbers(entry: Entry, value: object, count: int) -> tuple[float, ...]:
+    allowed = f'give {allowed_text(entry)} {entry.unit}'
+    if not isinstance(value, list | tuple | array) or len(value) != count:
+        raise ConfigError(entry.name, value, allowed)
+    try:
+        return tuple(check.number('', x, entry.lowest, entry.highest) for x in value)
+    except ConfigError:
+        raise ConfigError(entry.name, list(value), allowed) from None
+
+
+def _configuration(v: Mapping[str, Any]) -> SimConfig:
+    setup = Setup(
+        disc=_disc(v['disc']),
+        model=v['model'],
+        aero=v['aero'] or None,
+        moment_axes=v['moment_axes'],
+        air=Air(density=v['air_density'], gravity=v['gravity']),
+        wind=_wind_of(**_group(v, 'wind')),
+        step=1.0 / v['physics_rate'],
+    )
+    launch = Launch(**_group(v, 'launch'))
+    setup.check_step(launch.spin)
+    if v['ground'] and launch.height < 0.0:
+        raise ConfigError('launch.height', launch.height, 'with ground, release at 0 m or above')
+    if 0.0 < v['throw_period'] < setup.step:
+        allowed = f'give 0 or at least one step, {setup.step:g} s'
+        raise ConfigError('throw_period', v['throw_period'], allowed)
+    if not _FRAME_PREFIX.fullmatch(v['frame_prefix']):
+        raise ConfigError('frame_prefix', v['frame_prefix'], f'give {PREFIX_RULE}')
+    return SimConfig(
+        setup=setup,
+        launch=launch,
+        steps_per_publish=_steps_per_publish(v['physics_rate'], v['publish_rate']),
+        imu=ImuConfig(**_group(v, 'imu')),
+        **{field.name: v[field.name] for field in fields(SimConfig) if field.name in v},
+    )
+
+
+def _group(v: Mapping[str, Any], group: str) -> dict[str, Any]:
+    """Return the parameters `group.NAME` by NAME."""
+    prefix = f'{group}.'
+    return {name.removeprefix(prefix): x for name, x in v.items() if name.startswith(prefix)}
+
+
+def _wind_of(*, x: float, y: float, z: float, **profile_and_gusts: Any) -> Wind:
+    forward, right, down = (axes.paper_from_map((x, y, z)) + 0.0).tolist()  # no minus zeros
+    return Wind(mean=(forward, right, down), **profile_and_gusts)
+
+
+def _steps_per_publish(physics_rate: float, publish_rate: float) -> int:
+    ratio = physics_rate / publish_rate
+    steps = round(ratio)
+    if abs(ratio - steps) <= _INTEGER_RATIO * ratio:
+        return steps
+    near = (physics_rate / n for n in (math.ceil(ratio), math.floor(ratio)) if n > 0)
+    allowed = (
+        f'physics_rate {physics_rate:g} Hz must be a whole multiple of it; '
+        f'near are {" and ".join(f"{rate:.12g}" for rate in near)}'
+    )
+    raise ConfigError('publish_rate', publish_rate, allowed)
+
+
+def _disc(name: str) -> Disc:
+    try:
+        return _loaded(name, _version(name))
+    except ConfigError as error:
+        if error.thing == 'disc':
+            raise
+        raise ConfigError('disc', name, str(error)) from None
+
+
+@lru_cache(maxsize=8)
+def _loaded(name: str, version: tuple[int, int] | None) -> Disc:
+    """Load a disc once: reading the YAML takes milliseconds, in which no other thread runs."""
+    return catalogue.load(name)
+
+
+def _version(name: str) -> tuple[int, int] | None:
+    """Return what changes when the file changes."""
+    try:
+        status = Path(name).stat()
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
+_ROS_NAMES = {
+    'density': 'air_density',
+    'step': 'physics_rate',
+    **{name: f'launch.{name}' for name in LIMITS},
+    **{f'wind {axis.upper()}': f'wind.{axis}' for axis in 'xyz'},
+    **{name: f'wind.{name}' for name in ('roughness_length', 'turbulence', 'seed')},
+    'reference_height': 'wind.reference_height',
+}
+
+
+def _in_ros_words(error: ConfigError, v: Mapping[str, Any]) -> ConfigError:
+    """Return an error of `core` with the name and the value of the parameter."""
+    name = _ROS_NAMES.get(error.thing, error.thing)
+    allowed = error.allowed
+    if name == 'physics_rate':
+        allowed = f'its step is {error.value:g} s, and {allowed}'
+    if name == 'wind.reference_height':
+        allowed = f'{allowed}, at least twice wind.roughness_length'
+    return ConfigError(name, v.get(name, error.value), allowed)
