@@ -100,7 +100,11 @@ class FlightSimulator:
 
     @control.setter
     def control(self, control: Control) -> None:
-        self._control = checked_control(control)
+        self.take(checked_control(control))
+
+    def take(self, control: Control) -> None:
+        """Hold control inputs that are known to be floats in the range of `checked_control`."""
+        self._control = control
 
     def set_wind(self, wind: Wind) -> None:
         """Change the wind from the next step on; a change of the seed counts at the next release.

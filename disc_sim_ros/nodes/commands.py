@@ -13,7 +13,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from disc_sim_ros.core.equations import Control
+from disc_sim_ros.core.equations import DISC_AIR, Control
 from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.nodes import conversions, topics
 from disc_sim_ros.nodes.timeline import NANOSECONDS
@@ -149,7 +149,7 @@ class Held:
     """The control inputs that act now, and the times at which they fall to zero [ns]."""
 
     def __init__(self) -> None:
-        self.control = Control()
+        self.control = Control(axes=DISC_AIR)
         self._moment_until: float = math.inf
         self._coefficients_until: float = math.inf
 

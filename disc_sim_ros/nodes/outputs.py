@@ -221,6 +221,8 @@ class Outputs:
 
     def moment_applied(self, nanoseconds: int, moment: tuple[float, float, float, int]) -> None:
         """Publish a moment that acts from a time on: L, M, N in the paper's signs, their axes."""
+        if not self.applied_moment.heard:
+            return
         L, M, N, axes_of_moment = moment
         message = WrenchStamped()
         message.header.frame_id = self._frame_of[axes_of_moment]
@@ -231,11 +233,13 @@ class Outputs:
 
     def coefficients_applied(self, nanoseconds: int, values: tuple[float, ...]) -> None:
         """Publish coefficients that act from a time on, in the paper's signs."""
-        self.applied_coefficients.send(*stamp(nanoseconds), *values)
+        if self.applied_coefficients.heard:
+            self.applied_coefficients.send(*stamp(nanoseconds), *values)
 
     def wind_applied(self, nanoseconds: int, mean: Sequence[float]) -> None:
         """Publish a mean wind in `map` that blows from a time on [m/s]."""
-        self.applied_wind.send(*stamp(nanoseconds), *mean)
+        if self.applied_wind.heard:
+            self.applied_wind.send(*stamp(nanoseconds), *mean)
 
 
 def _imu_template(frame: str) -> Imu:

@@ -1,8 +1,10 @@
 """Which steps are due by the steady clock: absolute deadlines, catching up, slipping."""
 
+from collections import deque
 import math
 
 CATCH_UP = 0.1  # s of wall time whose steps are made up for after a stall
+RECENT = 1000  # deadlines
 
 
 class Pacer:
@@ -15,6 +17,7 @@ class Pacer:
         slipped: Wall time given up so far [s].
         slips: How often.
         missed: Deadlines met later than one step, so far.
+        recent: Lateness of the last deadlines [s].
         worst: Greatest lateness since `take_worst` was last called [s].
     """
 
@@ -24,6 +27,7 @@ class Pacer:
         self.slips = 0
         self.missed = 0
         self.worst = 0.0
+        self.recent: deque[float] = deque(maxlen=RECENT)
         self.restart(step, rate, now)
 
     def restart(self, step: float, rate: float, now: float) -> None:
@@ -38,6 +42,7 @@ class Pacer:
         if late < 0.0:
             return 0
         self.worst = max(self.worst, late)
+        self.recent.append(late)
         if late > self._period:
             self.missed += 1
         if late > CATCH_UP:
@@ -59,3 +64,8 @@ class Pacer:
         """Return the greatest lateness since the last call [s]."""
         worst, self.worst = self.worst, 0.0
         return worst
+
+    def quantile(self, share: float) -> float:
+        """Return the lateness that a share of the last deadlines did not exceed [s]."""
+        recent = sorted(self.recent.copy())
+        return recent[min(int(share * len(recent)), len(recent) - 1)] if recent else 0.0

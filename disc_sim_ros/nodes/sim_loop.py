@@ -278,7 +278,7 @@ class SimLoop(threading.Thread):
             self.commands.throw.drop(str(error))
             self._warn(f'throw dropped: {error}')
             return
-        sim.control = self._held.control
+        sim.take(self._held.control)
         self._sim = sim
         self._imu_errors = ImuErrors(config.imu, self._flight)
         self._flight += 1
@@ -357,23 +357,26 @@ class SimLoop(threading.Thread):
             self._blow(replace(self._wind, mean=mean))
 
     def _hold_moment(self, moment: tuple[float, float, float, int], until: float) -> None:
+        before = self._held.control
         self._held.set_moment(moment, until)
-        self._outputs.moment_applied(self.timeline.now, moment)
-        self._steer()
+        if self._held.control != before:
+            self._outputs.moment_applied(self.timeline.now, moment)
+            self._steer()
 
     def _hold_coefficients(self, values: tuple[float, float, float], until: float) -> None:
+        before = self._held.control
         self._held.set_coefficients(values, until)
-        self._outputs.coefficients_applied(self.timeline.now, values)
-        self._steer()
+        if self._held.control != before:
+            self._outputs.coefficients_applied(self.timeline.now, values)
+            self._steer()
 
     def _let_go(self) -> None:
-        if self._held.control != Held().control:
-            self._hold_moment(_NO_MOMENT, math.inf)
-            self._hold_coefficients(_NO_COEFFICIENTS, math.inf)
+        self._hold_moment(_NO_MOMENT, math.inf)
+        self._hold_coefficients(_NO_COEFFICIENTS, math.inf)
 
     def _steer(self) -> None:
         if self._sim is not None:
-            self._sim.control = self._held.control
+            self._sim.take(self._held.control)
 
     def _blow(self, wind: Wind) -> None:
         """Change mean and profile of the wind now; turbulence and seed wait for the next throw."""

@@ -132,6 +132,8 @@ class SimNode(Node):
             'paused': loop.paused,
             'real_time_factor': f'{factor:.4f}',
             'worst_lateness_s': f'{worst:.6f}',
+            'lateness_p50_s': f'{loop.pacer.quantile(0.5):.6f}',
+            'lateness_p99_s': f'{loop.pacer.quantile(0.99):.6f}',
             'missed_deadlines': loop.pacer.missed,
             'slips': loop.pacer.slips,
             'slipped_s': f'{loop.pacer.slipped:.6f}',

@@ -96,14 +96,14 @@ def test_the_effects_are_those_that_the_node_can_keep():
 def test_page_is_up_to_date():
     page = (ROOT / 'docs/parameters.md').read_text(encoding='utf-8')
     assert page == parameter_pages.markdown(), (
-        'run: python -m disc_sim_ros.nodes.parameters > docs/parameters.md'
+        'run: python -m disc_sim_ros.nodes.parameter_pages > docs/parameters.md'
     )
 
 
 def test_file_is_up_to_date():
     text = (ROOT / 'config/sim.yaml').read_text(encoding='utf-8')
     assert text == parameter_pages.yaml_file(), (
-        'run: python -m disc_sim_ros.nodes.parameters yaml > config/sim.yaml'
+        'run: python -m disc_sim_ros.nodes.parameter_pages yaml > config/sim.yaml'
     )
 
 
