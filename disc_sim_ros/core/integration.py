@@ -29,6 +29,7 @@ from disc_sim_ros.core.turbulence import (
 )
 
 FLYING, LANDED, NOT_FINITE = range(3)
+STATE_SIZE = len(State._fields)
 _CROSSING_TOLERANCE = 1e-12  # s; a thousandth of what is promised
 
 
@@ -240,18 +241,12 @@ def _write(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
     row[-1] = wind.Z
 
 
-class Advanced(NamedTuple):
-    """Where a flight is after some steps, and why they ended."""
-
-    status: int  # FLYING (all steps done), LANDED or NOT_FINITE
-    progress: Progress  # after the last whole step in the finite numbers and above the ground
-    touch_t: float  # s after release, of the landing
-    touch: State  # at the landing
+PROGRESS_SIZE = 1 + STATE_SIZE + 3 + 5 + 3 + 3 + 1
 
 
 @entry
 def run(
-    p: Progress,
+    flight: FloatArray,
     steps: int,
     plant: Plant,
     table: FloatArray,
@@ -261,27 +256,80 @@ def run(
     noise: FloatArray,
     step: float,
     ground: bool,
-) -> Advanced:
+    touch: FloatArray,
+) -> tuple[int, float]:
     """Fly some whole `steps` on, or to the ground; see `integrate` for the other arguments.
 
-    Of a flight at its release, k = 0, only the state counts.
+    Arrays, because named tuples cost Python more than a step costs the machine.
+
+    Args:
+        flight: A `Progress` in the order of its fields, shape (PROGRESS_SIZE,): the flight so far,
+            left as it is after the last whole step in the finite numbers and above the ground. Of
+            one at its release, k = 0, only the state counts.
+        steps: Whole steps to make.
+        plant: Constants of the flight.
+        table: Steady coefficients.
+        spin_terms: Coefficients that the spin causes.
+        control: Control inputs, held.
+        wind: Wind of the flight.
+        noise: Normal numbers that draw the gusts.
+        step: Integration step [s].
+        ground: End where Z = 0 is crossed from above.
+        touch: Filled with the state at the landing, shape (14,).
+
+    Returns:
+        FLYING (all steps done), LANDED or NOT_FINITE, and the time since the release [s].
     """
+    p = _unpacked(flight)
     if p.k == 0:
         p = begin(p.state, plant, table, spin_terms, control, wind, noise)
+    status = FLYING
+    t = (p.k + steps) * step
     for _ in range(steps):
-        s, g = p.state, p.gust
         after = advance(p, step, plant, table, spin_terms, control, wind, noise, step)
+        s, g = p.state, p.gust
         if not is_finite(after.state):
-            return Advanced(NOT_FINITE, p, p.k * step, s)
+            status = NOT_FINITE
+            t = p.k * step
+            break
         if ground and after.state.Z > 0.0:
-            Z = after.state.Z
-            next_g = after.gust
+            Z, next_g = after.state.Z, after.gust
             x = crossing(s, step, Z, g, next_g, wind, plant, table, spin_terms, control)
             x_g = between(g, next_g, x / step)
             s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
-            return Advanced(LANDED, p, p.k * step + x, s)
+            for i in range(STATE_SIZE):
+                touch[i] = s[i]
+            status = LANDED
+            t = p.k * step + x
+            break
         p = after
-    return Advanced(FLYING, p, p.k * step, p.state)
+    _pack(p, flight)
+    return status, t
+
+
+@inline
+def _unpacked(a: FloatArray) -> Progress:
+    s = State(
+        a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13], a[14]
+    )
+    gust = Velocity(a[15], a[16], a[17])
+    filters = GustFilter(a[18], a[19], a[20], a[21], a[22])
+    drawn, next_drawn = Velocity(a[23], a[24], a[25]), Velocity(a[26], a[27], a[28])
+    return Progress(int(a[0]), s, gust, filters, drawn, next_drawn, int(a[29]))
+
+
+@inline
+def _pack(p: Progress, a: FloatArray) -> None:
+    a[0] = p.k
+    for i in range(STATE_SIZE):
+        a[1 + i] = p.state[i]
+    for i in range(3):
+        a[15 + i] = p.gust[i]
+        a[23 + i] = p.drawn[i]
+        a[26 + i] = p.next_drawn[i]
+    for i in range(5):
+        a[18 + i] = p.filters[i]
+    a[29] = p.interval
 
 
 class Observed(NamedTuple):
@@ -303,16 +351,18 @@ class Observed(NamedTuple):
 
 @entry
 def observe(
-    s: State,
-    gust: Velocity,
+    flight: FloatArray,
     plant: Plant,
     table: FloatArray,
     spin_terms: FloatArray,
     control: Control,
     wind: WindData,
-) -> Observed:
-    """Return what acts on the disc right now; see `integrate` for the arguments."""
-    here = wind_at(s.Z, gust, wind)
+    seen: FloatArray,
+) -> None:
+    """Fill `seen` with an `Observed` of a flight as `run` left it, shape (12,)."""
+    p = _unpacked(flight)
+    s = p.state
+    here = wind_at(s.Z, p.gust, wind)
     d = derivative(s, here, plant, table, spin_terms, control)
     a = flow(s, here)
     C = coefficients(a, s.r, plant, table, spin_terms)
@@ -321,4 +371,6 @@ def observe(
     m = moment(a, s, C, plant, only_air)
     L = m.L + m.D_xx * s.p + m.D_xy * s.q
     M = m.M + m.D_xy * s.p + m.D_yy * s.q
-    return Observed(d.VX, d.VY, d.VZ, d.p, d.q, d.r, X, Y, Z, L, M, m.N)
+    found = (d.VX, d.VY, d.VZ, d.p, d.q, d.r, X, Y, Z, L, M, m.N)
+    for i in range(len(found)):
+        seen[i] = found[i]

@@ -12,12 +12,11 @@ from disc_sim_ros.core.disc import FloatArray
 from disc_sim_ros.core.equations import Control, State, Velocity
 from disc_sim_ros.core.errors import ConfigError, IntegrationError
 from disc_sim_ros.core.flight import NO_CONTROL, NO_NOISE, Setup, checked_control
-from disc_sim_ros.core.integration import LANDED, NOT_FINITE, Progress
+from disc_sim_ros.core.integration import LANDED, NOT_FINITE, PROGRESS_SIZE, STATE_SIZE
 from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS, GustFilter, wind_at
+from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS, wind_at
 
-_STILL = Velocity(0.0, 0.0, 0.0)
-_NO_FILTERS = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
+_GUST = slice(1 + STATE_SIZE, 4 + STATE_SIZE)  # in a Progress
 NOTHING = integration.Observed(*(0.0,) * 12)  # acts on a disc that is held or lies
 _FIRST_GUSTS = 1000  # drawn at first; the store doubles when a flight outlasts it
 
@@ -53,11 +52,12 @@ class FlightSimulator:
         self.landed = False
         self.touch_time = math.inf
         self._control = NO_CONTROL
-        self._progress = Progress(0, release, _STILL, _NO_FILTERS, _STILL, _STILL, 0)
+        self._flight = np.zeros(PROGRESS_SIZE)
+        self._flight[1 : 1 + STATE_SIZE] = release
+        self._touch = np.empty(STATE_SIZE)
         self._random = np.random.Generator(np.random.Philox(int(setup.wind.seed)))
         self._noise = NO_NOISE
-        self._state = release
-        self.touch = release
+        self._state = self.touch = release
         self.advance(0)  # completes the state: gust, and p and q of the precession model
 
     @property
@@ -73,7 +73,8 @@ class FlightSimulator:
     @property
     def wind(self) -> Velocity:
         """Return the wind at the disc, gusts included, earth axes 1."""
-        return wind_at_disc(self._state, self._progress.gust, self.setup)
+        gust = Velocity(*self._flight[_GUST].tolist())
+        return wind_at_disc(self._state, gust, self.setup)
 
     def observe(self) -> integration.Observed:
         """Return the rates of change and the aerodynamic force and moment right now.
@@ -82,16 +83,17 @@ class FlightSimulator:
         """
         if self.landed:
             return NOTHING
-        setup = self.setup
-        return integration.observe(
-            self._state,
-            self._progress.gust,
+        setup, seen = self.setup, np.empty(len(NOTHING))
+        integration.observe(
+            self._flight,
             setup.plant,
             setup.disc.table_rows,
             setup.disc.spin_terms,
             self._control,
             setup.wind_data,
+            seen,
         )
+        return integration.Observed(*seen.tolist())
 
     @property
     def control(self) -> Control:
@@ -128,8 +130,8 @@ class FlightSimulator:
             self.steps += steps
             return
         setup = self.setup
-        done = integration.run(
-            self._progress,
+        status, t = integration.run(
+            self._flight,
             steps,
             setup.plant,
             setup.disc.table_rows,
@@ -139,19 +141,20 @@ class FlightSimulator:
             self._noise_until(self.steps + steps),
             float(setup.step),
             self.ground,
+            self._touch,
         )
-        self._progress = done.progress
-        self._state = done.progress.state
-        if done.status == NOT_FINITE:
-            message = f'the flight left the finite numbers at t = {done.touch_t:.6g} s'
+        if status == LANDED:
+            self.landed = True
+            self.touch_time = t
+            self.touch = State(*self._touch.tolist())
+            # At rest where it touched: no velocity, no rates, the attitude as it was.
+            self._state = self.touch._replace(Z=0.0, VX=0.0, VY=0.0, VZ=0.0, p=0.0, q=0.0, r=0.0)
+        else:
+            self._state = State(*self._flight[1 : 1 + STATE_SIZE].tolist())
+        if status == NOT_FINITE:
+            message = f'the flight left the finite numbers at t = {t:.6g} s'
             raise IntegrationError(message)
         self.steps += steps
-        if done.status == LANDED:
-            self.landed = True
-            self.touch_time = done.touch_t
-            # At rest where it touched: no velocity, no rates, the attitude as it was.
-            self.touch = done.touch
-            self._state = done.touch._replace(Z=0.0, VX=0.0, VY=0.0, VZ=0.0, p=0.0, q=0.0, r=0.0)
 
     def _noise_until(self, step: int) -> FloatArray:
         """Return gust noise for all steps up to `step`, the same numbers that `fly` draws."""
