@@ -77,6 +77,7 @@ def columns(trajectory: Trajectory) -> dict[str, FloatArray]:
         'alpha_deg': np.degrees(trajectory.alpha),
         'roll_deg': euler[:, 0],
         'pitch_deg': euler[:, 1],
+        'yaw_deg': euler[:, 2],
         'absolute_attitude_deg': np.degrees(trajectory.absolute_attitude),
         'spin_rad_s': trajectory.spin,
         'advance_ratio': trajectory.advance_ratio,
@@ -134,6 +135,7 @@ def summary(flight: Flight) -> str:
     lines += [
         f'  {ended} after {flight.time:.3f} s at x {flight.position[0]:.2f} m, '
         f'y {flight.position[1]:.2f} m, z {flight.position[2]:.2f} m',
+        *(['  (on the ground and not climbing: try --height 1)'] if flight.time == 0.0 else []),
         f'  range   {flight.range:.2f} m, {_sideways(flight.drift)}, apex {flight.apex:.2f} m',
         f'  speed   {math.hypot(*flight.end[3:6]):.2f} m/s at the end'
         + (f', {flight.end.r / launch.spin:.1%} of the spin left' if launch.spin else ''),

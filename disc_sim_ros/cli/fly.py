@@ -43,6 +43,8 @@ _FLAG_OF = {field: flag for flag, field, _, _ in _LAUNCH_FLAGS} | {
     'sample_rate': '--samples',
 }
 
+_HINTS = {'--height': ', or give --no-ground'}
+
 
 def parser() -> Parser:
     """Return the command line of `fly`."""
@@ -157,7 +159,8 @@ def main(arguments: list[str] | None = None) -> int:
         thing = _FLAG_OF.get(error.thing, error.thing)
         if thing == '--spin' and hasattr(chosen, 'advance_ratio'):
             thing = '--advance-ratio, which means a spin'
-        p.error(str(ConfigError(thing, error.value, error.allowed)))
+        allowed = error.allowed + _HINTS.get(thing, '')
+        p.error(str(ConfigError(thing, error.value, allowed)))
     except DiscSimError as error:
         sys.stderr.write(f'fly: error: {error}\n')
         return 1
@@ -182,7 +185,9 @@ def _run(chosen: argparse.Namespace) -> None:
     from disc_sim_ros.analysis import report  # noqa: PLC0415
 
     if chosen.json:
-        output.show(json.dumps(report.document(found), allow_nan=False))
+        document = report.document(found)
+        document['launch']['disc'] = chosen.disc  # of a file its path, which finds it again
+        output.show(json.dumps(document, allow_nan=False))
         return
     lines = [report.summary(found)]
     if csv is not None:
@@ -209,8 +214,6 @@ def _fly(chosen: argparse.Namespace, rate: float) -> flight.Flight:
     values = {field: getattr(chosen, _dest(flag)) for flag, field, _, _ in _LAUNCH_FLAGS}
     thrown = launch.Launch(spin=spin, **values)
     ground = not chosen.no_ground
-    if ground and thrown.height < 0.0:
-        raise ConfigError('--height', thrown.height, 'give 0 m or above, or --no-ground')
     setup = flight.Setup(
         disc=disc,
         model=chosen.model,
@@ -224,7 +227,8 @@ def _fly(chosen: argparse.Namespace, rate: float) -> flight.Flight:
         ),
         step=chosen.step,
     )
-    setup.check_step(thrown.spin)  # before any note: what is refused says one line
+    # Before any note: what is refused says one line.
+    flight.check_flight(thrown, setup, chosen.duration, ground=ground, sample_rate=rate)
     if chosen.model == 'precession' and (thrown.roll_rate or thrown.pitch_rate):
         _note('--roll-rate and --pitch-rate change nothing: the precession model sets both itself')
     if not flight.is_ready():

@@ -21,6 +21,7 @@ import numba
 F = TypeVar('F', bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'nogil': True}
+_NEEDED = 20 << 20  # bytes of free space; the machine code is about 2 MB
 _KEEP_UNUSED_S = 30 * 86400.0  # caches of older sources go after a month without use
 
 
@@ -59,7 +60,7 @@ def is_compiled(function: Callable[..., Any]) -> bool:
         return True
     folder = function.stats.cache_path
     name = function.py_func.__name__
-    on_disk = folder is not None and any(Path(folder).glob(f'*.{name}-*.nbi'))
+    on_disk = folder is not None and any(Path(folder).glob(f'*.{name}-*.nbc'))
     return on_disk or bool(function.signatures)
 
 
@@ -79,9 +80,10 @@ def _cache_folder() -> Path | None:
             _remove_unused(folder.parent)
         elif time.time() - folder.stat().st_mtime > _KEEP_UNUSED_S / 2:
             folder.touch()
-    except (OSError, RuntimeError):  # unwritable, or no home at all: compile in memory
+        usable = os.access(folder, os.W_OK) and shutil.disk_usage(folder).free > _NEEDED
+    except (OSError, RuntimeError):  # unwritable, or no home at all
         return None
-    return folder if os.access(folder, os.W_OK) else None
+    return folder if usable else None  # without a folder it is compiled in memory
 
 
 def _remove_unused(base: Path) -> None:

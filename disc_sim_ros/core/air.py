@@ -45,4 +45,4 @@ class Wind:
         lowest = max(2.0 * self.roughness_length, 0.1)
         check.number('reference_height', self.reference_height, lowest, 1000.0, unit='m')
         check.number('turbulence', self.turbulence, 0.0, 50.0, unit='m/s')
-        check.number('seed', self.seed, 0, 2**63 - 1)
+        check.whole_number('seed', self.seed, 0, 2**63 - 1)

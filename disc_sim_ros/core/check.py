@@ -45,6 +45,13 @@ def number(
     return x
 
 
+def whole_number(thing: str, value: object, lowest: int, highest: int) -> int:
+    """Return `value` if it is a whole number in [lowest, highest]."""
+    if isinstance(value, bool) or not isinstance(value, int) or not lowest <= value <= highest:
+        raise ConfigError(thing, value, f'give a whole number from {lowest} to {highest}')
+    return value
+
+
 def choice(thing: str, value: object, allowed: Collection[str]) -> str:
     """Return `value` if it is one of the `allowed` words."""
     if not isinstance(value, str) or value not in allowed:

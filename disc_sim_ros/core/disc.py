@@ -169,6 +169,13 @@ class Disc:
         """Say whether the disc holds coefficients of the kind `aero`."""
         return (self.table if aero == 'table' else self.linear) is not None
 
+    def steepest_moment(self, aero: str) -> float:
+        """Return the largest slope of C_M over the angle of attack, of either sign [1/rad]."""
+        if aero == 'linear' and self.linear is not None:
+            return abs(self.linear.CM_alpha)
+        alpha, C_M = self.table_rows[:, 0], self.table_rows[:, 3]
+        return float(np.max(np.abs(np.diff(C_M) / np.diff(alpha))))
+
     @cached_property
     def table_rows(self) -> FloatArray:
         """Return the table as `aerodynamics.table_coefficients` takes it, shape (n, 4).

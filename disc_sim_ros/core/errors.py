@@ -2,6 +2,7 @@
 
 import reprlib
 
+_LONGEST = 80  # characters
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel = 2
 _SHORT.maxstring = _SHORT.maxother = 60
@@ -30,4 +31,8 @@ def brief(value: object) -> str:
     """Return `value` as one short line, however large, deep or odd it is."""
     if isinstance(value, float):
         return f'{value:.12g}'
-    return ' '.join(_SHORT.repr(value).split())
+    try:
+        text = ' '.join(_SHORT.repr(value).split())
+    except ValueError:  # Python does not write out whole numbers of thousands of digits
+        return 'a number of thousands of digits'
+    return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 3]}...'

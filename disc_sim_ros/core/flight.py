@@ -23,6 +23,7 @@ from disc_sim_ros.core.equations import (
 )
 from disc_sim_ros.core.errors import ConfigError, IntegrationError
 from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.core.rk4 import STABLE
 from disc_sim_ros.core.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS, WindData
 
@@ -31,7 +32,6 @@ MOMENT_AXES = {'body': BODY, 'wind': WIND}
 NO_CONTROL = Control()
 LONGEST = 3600.0  # s
 MOST_SAMPLES = 5_000_000
-_STABLE = 2.78  # RK4 on the imaginary axis: h times the nutation rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,15 +90,30 @@ class Setup:
             line=_line(disc),
         )
 
-    def check_step(self, spin: float) -> None:
-        """Refuse a step that is too long for the nutation at a spin [rad/s].
+    def check_step(self, spin: float, speed: float) -> None:
+        """Refuse a step that is too long for what the disc does at release.
+
+        Args:
+            spin: Spin rate [rad/s].
+            speed: Speed over the ground [m/s].
 
         Raises:
             ConfigError: RK4 would blow up, so that the flight would mean nothing.
         """
-        nutation = abs(spin) * self.disc.inertia_axial / self.disc.inertia_diametral
-        if self.model != 'precession' and self.step * nutation > _STABLE:
-            allowed = f'at spin {spin:g} rad/s RK4 needs at most {_STABLE / nutation:.3g} s'
+        if self.model == 'precession':  # p and q follow the moments at once
+            return
+        disc = self.disc
+        V = speed + math.hypot(*self.wind.mean)
+        nutation = abs(spin) * disc.inertia_axial / disc.inertia_diametral
+        rhoVSc_I = self.air.density * V * disc.area * disc.diameter / disc.inertia_diametral
+        damping = 0.25 * rhoVSc_I * disc.diameter * max(-disc.C_Lp, -disc.C_Mq)
+        pitching = math.sqrt(0.5 * rhoVSc_I * V * disc.steepest_moment(self.aero or disc.aero))
+        fastest = max(nutation, damping, pitching)
+        if self.step * fastest > STABLE:
+            allowed = (
+                f'at spin {spin:g} rad/s and {V:g} m/s through the air RK4 needs at most '
+                f'{STABLE / fastest:.3g} s'
+            )
             raise ConfigError('step', self.step, allowed)
 
     @cached_property
@@ -184,16 +199,9 @@ def fly(
 
     Raises:
         ConfigError: A value out of range, a step too long for the spin, a release underground.
-        IntegrationError: The state would have left the finite numbers.
+        IntegrationError: The disc turned or moved faster than the step can follow.
     """
-    check.number('duration', duration, above=0.0, highest=LONGEST, unit='s')
-    check.number('sample_rate', sample_rate, 0.0, 1e5, unit='1/s')
-    setup.check_step(launch.spin)
-    if ground and launch.height < 0.0:
-        raise ConfigError('height', launch.height, 'with ground, release at 0 m or above')
-    rows = math.floor(duration * sample_rate * (1 + 1e-12)) + 1 if sample_rate > 0.0 else 0
-    if rows > MOST_SAMPLES:
-        raise ConfigError('sample_rate', sample_rate, f'at most {MOST_SAMPLES} samples a flight')
+    rows = check_flight(launch, setup, duration, ground=ground, sample_rate=sample_rate)
     samples = np.empty((rows, COLUMNS))
     ended = integration.integrate(
         launch.state(),
@@ -209,9 +217,8 @@ def fly(
         float(sample_rate),
         samples,
     )
-    if ended.status == integration.NOT_FINITE:
-        message = f'the flight left the finite numbers at t = {ended.t:.6g} s; try a shorter step'
-        raise IntegrationError(message)
+    if ended.status == integration.LOST:
+        raise lost(ended.t, setup.step)
     return Flight(
         launch=launch,
         setup=setup,
@@ -221,6 +228,33 @@ def fly(
         end=ended.state,
         apex=-ended.apex_Z,
         trajectory=Trajectory(samples[: ended.samples], setup.disc.diameter),
+    )
+
+
+def check_flight(
+    launch: Launch, setup: Setup, duration: float, *, ground: bool, sample_rate: float
+) -> int:
+    """Check the arguments of `fly` together, and return how many samples it may write.
+
+    Raises:
+        ConfigError: As of `fly`.
+    """
+    check.number('duration', duration, above=0.0, highest=LONGEST, unit='s')
+    check.number('sample_rate', sample_rate, 0.0, 1e5, unit='1/s')
+    setup.check_step(launch.spin, launch.speed)
+    if ground and launch.height < 0.0:
+        raise ConfigError('height', launch.height, 'with ground, release at 0 m or above')
+    rows = math.floor(duration * sample_rate * (1 + 1e-12)) + 1 if sample_rate > 0.0 else 0
+    if rows > MOST_SAMPLES:
+        raise ConfigError('sample_rate', sample_rate, f'at most {MOST_SAMPLES} samples a flight')
+    return rows
+
+
+def lost(t: float, step: float) -> IntegrationError:
+    """Return the error of a flight that was lost at a time [s] with a step [s]."""
+    return IntegrationError(
+        f'at t = {t:.6g} s the disc turned or moved faster than steps of {step:g} s can follow; '
+        'try a shorter step'
     )
 
 

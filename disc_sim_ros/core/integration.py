@@ -17,7 +17,7 @@ from disc_sim_ros.core.equations import (
     force,
     moment,
 )
-from disc_sim_ros.core.rk4 import between, is_finite, rk4_step
+from disc_sim_ros.core.rk4 import between, is_sound, rk4_step
 from disc_sim_ros.core.turbulence import (
     GUST_INTERVAL,
     GustFilter,
@@ -28,7 +28,7 @@ from disc_sim_ros.core.turbulence import (
     wind_at,
 )
 
-FLYING, LANDED, NOT_FINITE = range(3)
+FLYING, LANDED, LOST = range(3)  # LOST: beyond the numbers or the rates that a step can follow
 STATE_SIZE = len(State._fields)
 _CROSSING_TOLERANCE = 1e-12  # s; a thousandth of what is promised
 
@@ -48,7 +48,7 @@ class Progress(NamedTuple):
 class Ended(NamedTuple):
     """How a flight ended: why, when, where, its apex and how many samples were written."""
 
-    status: int  # FLYING (time is up), LANDED or NOT_FINITE (the state is the last finite one)
+    status: int  # FLYING (time is up), LANDED or LOST (the state is the last sound one)
     t: float  # s
     state: State
     apex_Z: float  # m, least Z (down) on the way
@@ -156,8 +156,8 @@ def integrate(
             next_t = duration
         p = advance(p, h, plant, table, spin_terms, control, wind, noise, step)
         next_s, next_g = p.state, p.gust
-        if not is_finite(next_s):
-            return Ended(NOT_FINITE, t, s, apex_Z, written)
+        if not is_sound(next_s, step, plant):
+            return Ended(LOST, t, s, apex_Z, written)
         landed = ground and next_s.Z > 0.0
         if landed:
             x = crossing(s, h, next_s.Z, g, next_g, wind, plant, table, spin_terms, control)
@@ -264,7 +264,7 @@ def run(
 
     Args:
         flight: A `Progress` in the order of its fields, shape (PROGRESS_SIZE,): the flight so far,
-            left as it is after the last whole step in the finite numbers and above the ground. Of
+            left as it is after the last whole step that is sound and above the ground. Of
             one at its release, k = 0, only the state counts.
         steps: Whole steps to make.
         plant: Constants of the flight.
@@ -278,7 +278,7 @@ def run(
         touch: Filled with the state at the landing, shape (14,).
 
     Returns:
-        FLYING (all steps done), LANDED or NOT_FINITE, and the time since the release [s].
+        FLYING (all steps done), LANDED or LOST, and the time since the release [s].
     """
     p = _unpacked(flight)
     if p.k == 0:
@@ -288,8 +288,8 @@ def run(
     for _ in range(steps):
         after = advance(p, step, plant, table, spin_terms, control, wind, noise, step)
         s, g = p.state, p.gust
-        if not is_finite(after.state):
-            status = NOT_FINITE
+        if not is_sound(after.state, step, plant):
+            status = LOST
             t = p.k * step
             break
         if ground and after.state.Z > 0.0:

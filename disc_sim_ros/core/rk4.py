@@ -5,6 +5,7 @@ import math
 from disc_sim_ros.core._jit import inline, jit
 from disc_sim_ros.core.disc import FloatArray
 from disc_sim_ros.core.equations import (
+    PRECESSION,
     Control,
     Plant,
     State,
@@ -13,6 +14,8 @@ from disc_sim_ros.core.equations import (
     derivative,
 )
 from disc_sim_ros.core.turbulence import WindData, wind_at
+
+STABLE = 2.78  # largest step times rate, of a decay or an oscillation, that stays bounded
 
 
 @jit
@@ -71,7 +74,10 @@ def moved(s: State, h: float, k: State) -> State:
 
 
 @inline
-def is_finite(s: State) -> bool:
-    """Say whether every number of the state is finite."""
+def is_sound(s: State, h: float, plant: Plant) -> bool:
+    """Say whether the state is finite, and turns slowly enough for steps of `h` to follow."""
     total = s.X + s.Y + s.Z + s.VX + s.VY + s.VZ + s.e0 + s.e1 + s.e2 + s.e3
-    return math.isfinite(total + s.p + s.q + s.r + s.sigma)
+    fastest = max(abs(s.p), abs(s.q), abs(s.r))
+    if plant.model != PRECESSION:
+        fastest = max(fastest, abs(s.r) * plant.I_z / plant.I_x)
+    return math.isfinite(total + s.sigma) and fastest * h <= STABLE

@@ -10,9 +10,9 @@ from disc_sim_ros.core._jit import is_compiled
 from disc_sim_ros.core.air import Wind
 from disc_sim_ros.core.disc import FloatArray
 from disc_sim_ros.core.equations import Control, State, Velocity
-from disc_sim_ros.core.errors import ConfigError, IntegrationError
-from disc_sim_ros.core.flight import NO_CONTROL, NO_NOISE, Setup, checked_control
-from disc_sim_ros.core.integration import LANDED, NOT_FINITE, PROGRESS_SIZE, STATE_SIZE
+from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros.core.flight import NO_CONTROL, NO_NOISE, Setup, checked_control, lost
+from disc_sim_ros.core.integration import LANDED, LOST, PROGRESS_SIZE, STATE_SIZE
 from disc_sim_ros.core.launch import Launch
 from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS, wind_at
 
@@ -42,7 +42,7 @@ class FlightSimulator:
         Raises:
             ConfigError: A release underground, or a step too long for the spin.
         """
-        setup.check_step(release.r)
+        setup.check_step(release.r, math.hypot(release.VX, release.VY, release.VZ))
         if ground and release.Z > 0.0:
             raise ConfigError('height', -release.Z, 'with ground, release at 0 m or above')
         self.setup = setup
@@ -123,8 +123,8 @@ class FlightSimulator:
         """Fly some steps on.
 
         Raises:
-            IntegrationError: The state would have left the finite numbers; it stays at the last
-                finite one.
+            IntegrationError: The disc turned or moved faster than the step can follow; the state
+                stays at the last sound one.
         """
         if self.landed:
             self.steps += steps
@@ -151,9 +151,8 @@ class FlightSimulator:
             self._state = self.touch._replace(Z=0.0, VX=0.0, VY=0.0, VZ=0.0, p=0.0, q=0.0, r=0.0)
         else:
             self._state = State(*self._flight[1 : 1 + STATE_SIZE].tolist())
-        if status == NOT_FINITE:
-            message = f'the flight left the finite numbers at t = {t:.6g} s'
-            raise IntegrationError(message)
+        if status == LOST:
+            raise lost(t, setup.step)
         self.steps += steps
 
     def _noise_until(self, step: int) -> FloatArray:

@@ -110,7 +110,7 @@ def test_loads_are_force_and_moment_of_the_motion():
 def test_a_flight_beyond_the_finite_numbers_stops_at_the_last_of_them():
     disc = dataclasses.replace(FRISBEE, mass=1e-300, aero='linear')
     sim = FlightSimulator(Setup(disc=disc), Launch(speed=200.0, angle_of_attack=90.0).state())
-    with pytest.raises(IntegrationError, match='finite'):
+    with pytest.raises(IntegrationError, match='shorter step'):
         sim.advance(10)
     assert all(math.isfinite(x) for x in sim.state)
 
