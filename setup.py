@@ -11,7 +11,7 @@ NAME = 'disc_sim_ros'
 # A new executable is one line here and one file in scripts/, a copy of scripts/fly with its name.
 EXECUTABLES = {
     'fly': 'disc_sim_ros.cli.fly:main',
-    'sim_node': 'disc_sim_ros.nodes.sim_node:main',
+    'sim_node': 'disc_sim_ros.cli.sim_node:main',
 }
 
 SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz')

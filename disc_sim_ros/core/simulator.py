@@ -129,6 +129,8 @@ class FlightSimulator:
         if self.landed:
             self.steps += steps
             return
+        if self.steps == 0:  # `run` completes a release: once, because twice moves the last bits
+            self._flight[1 : 1 + STATE_SIZE] = self.release
         setup = self.setup
         status, t = integration.run(
             self._flight,

@@ -118,11 +118,13 @@ class Commands:
 
     def _take(self, topic: Topic, message: Any, now: int) -> None:
         value = topic.read(message)
+        stamp = message.header.stamp
+        at = max(stamp.sec * NANOSECONDS + stamp.nanosec, now)
+        while at == now and topic.waiting and topic.waiting[0][0] <= now:
+            heapq.heappop(topic.waiting)  # this one supersedes it; time may stand still for long
         if len(topic.waiting) >= MOST_WAITING:
             allowed = f'{MOST_WAITING} commands at most may wait for their time'
             raise ConfigError(topic.name, 'one more', allowed)
-        stamp = message.header.stamp
-        at = max(stamp.sec * NANOSECONDS + stamp.nanosec, now)
         heapq.heappush(topic.waiting, (at, next(self._order), value))
         topic.accepted += 1
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 import math
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -123,6 +124,7 @@ class Outputs:
         self.clock = None
         if with_clock:
             self.clock = channel(topics.CLOCK, Clock(), stamps=('clock',), qos=topics.CLOCK_QOS)
+        self._next_tick = 0.0  # by the steady clock [s]
         self.path = Channel(node, Path, topics.PATH, topics.STATE_QOS)
         self._path = Path()
         self._path.header.frame_id = map_
@@ -141,11 +143,24 @@ class Outputs:
         wind.header.frame_id = map_
         self.applied_wind = channel(topics.APPLIED_WIND, wind, conversions.VECTOR_FIELDS)
 
+    def tick(self, nanoseconds: int, *, patience: float = -topics.CLOCK_PERIOD) -> None:
+        """Publish the time, to whoever listens, every CLOCK_PERIOD of wall time at most.
+
+        Args:
+            nanoseconds: The time.
+            patience: How long after that period to publish [s]. By default one tick may come
+                early, so that none is left out where messages come with just that period.
+        """
+        if self.clock is None or not self.clock.heard:
+            return
+        now = time.monotonic()
+        if now >= self._next_tick + patience:
+            self._next_tick = max(self._next_tick, now) + topics.CLOCK_PERIOD
+            self.clock.send(*stamp(nanoseconds))
+
     def motion(self, nanoseconds: int, s: State) -> None:
         """Publish where the disc is and how it moves, to whoever listens."""
         sec, ns = stamp(nanoseconds)
-        if self.clock is not None:
-            self.clock.send(sec, ns)
         if self.odom.heard:
             values = conversions.odometry(s)
             self.odom.send(sec, ns, *values)

@@ -17,6 +17,7 @@ class Pacer:
         slipped: Wall time given up so far [s].
         slips: How often.
         missed: Deadlines met later than one step, so far.
+        restarts: How often `restart` was called.
         recent: Lateness of the last deadlines [s].
         worst: Greatest lateness since `take_worst` was last called [s].
     """
@@ -27,6 +28,7 @@ class Pacer:
         self.slips = 0
         self.missed = 0
         self.worst = 0.0
+        self.restarts = 0
         self.recent: deque[float] = deque(maxlen=RECENT)
         self.restart(step, rate, now)
 
@@ -35,6 +37,7 @@ class Pacer:
         self._period = step / rate  # s of wall time for a step
         self._epoch = now
         self._done = 0
+        self.restarts += 1
 
     def due(self, now: float) -> int:
         """Return how many steps are due at `now`, after giving up what cannot be made up for."""

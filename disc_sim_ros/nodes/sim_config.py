@@ -172,7 +172,7 @@ def _configuration(v: Mapping[str, Any]) -> SimConfig:
         step=1.0 / v['physics_rate'],
     )
     launch = Launch(**_group(v, 'launch'))
-    setup.check_step(launch.spin)
+    setup.check_step(launch.spin, launch.speed)
     if v['ground'] and launch.height < 0.0:
         raise ConfigError('launch.height', launch.height, 'with ground, release at 0 m or above')
     if 0.0 < v['throw_period'] < setup.step:

@@ -14,7 +14,7 @@ from disc_sim_ros.core.air import Wind
 from disc_sim_ros.core.equations import DISC_AIR, State, Velocity
 from disc_sim_ros.core.errors import ConfigError, DiscSimError, IntegrationError
 from disc_sim_ros.core.simulator import NOTHING, FlightSimulator
-from disc_sim_ros.nodes import conversions
+from disc_sim_ros.nodes import conversions, topics
 from disc_sim_ros.nodes.commands import Commands, Held, due
 from disc_sim_ros.nodes.configuration import configuration_text
 from disc_sim_ros.nodes.imu import ImuErrors
@@ -24,7 +24,8 @@ from disc_sim_ros.nodes.punctual import make_punctual
 from disc_sim_ros.nodes.sim_config import SimConfig
 from disc_sim_ros.nodes.timeline import NANOSECONDS, Timeline
 
-LONGEST_SLEEP = 0.01  # s; requests are served at least this often
+LONGEST_SLEEP = 0.01  # s
+LONGEST_WAIT = 0.5  # s of wall time for a request until a message is due
 LONGEST_QUANTUM = 1e-3  # s of simulated time between two looks at the command topics
 _NO_MOMENT = (0.0, 0.0, 0.0, DISC_AIR)
 _NO_COEFFICIENTS = (0.0, 0.0, 0.0)
@@ -61,9 +62,13 @@ class SimLoop(threading.Thread):
         outputs: Outputs,
         commands: Commands,
         start: int,
-        warn: Callable[[str], None],
+        warn: Callable[..., None],
     ) -> None:
-        """Prepare the thread; `start` is the first stamp [ns], `warn` logs a line."""
+        """Prepare the thread.
+
+        `start` is the first stamp [ns]; `warn(text, about)` logs a line, now and then about the
+        same thing.
+        """
         super().__init__(name='simulation')
         self.timeline = Timeline(start, config.physics_rate)
         self.pacer = Pacer(config.setup.step, max(config.real_time_factor, 1e-9), 0.0)
@@ -104,7 +109,7 @@ class SimLoop(threading.Thread):
     def throw(self) -> str:
         """Let the disc go as configured; one in flight is taken out of the air."""
         self._throw(None)
-        return f'flight {self._flight}, released at {self.timeline.now / NANOSECONDS:.9f} s'
+        return f'flight {self._flight}, released at {in_seconds(self.timeline.now)} s'
 
     def reset(self) -> str:
         """Put the disc back to its launch, at rest; forget commands and the number of flights."""
@@ -125,7 +130,7 @@ class SimLoop(threading.Thread):
     def pause(self) -> str:
         """Let time stand still."""
         self.paused = True
-        return f'time stands still at {self.timeline.now / NANOSECONDS:.9f} s'
+        return f'time stands still at {in_seconds(self.timeline.now)} s'
 
     def resume(self) -> str:
         """Let time go on."""
@@ -142,7 +147,7 @@ class SimLoop(threading.Thread):
             raise ConfigError('~/step', 'a running simulation', 'pause it first by ~/pause')
         self._poll()
         self._advance(self._config.steps_per_publish, serve=False)
-        return f'now at {self.timeline.now / NANOSECONDS:.9f} s'
+        return f'now at {in_seconds(self.timeline.now)} s'
 
     def configure(self, config: SimConfig) -> str:
         """Take changed parameters: wind and pace at once, the rest at the next throw."""
@@ -153,7 +158,8 @@ class SimLoop(threading.Thread):
             self._blow(config.setup.wind)
         if config.throw_period != before.throw_period and self._flight:
             self._throw_at = self._after_period()
-        self._restart_pacer()
+        if config.real_time_factor != before.real_time_factor:
+            self._restart_pacer()
         return ''
 
     # ---- the thread ----
@@ -171,6 +177,10 @@ class SimLoop(threading.Thread):
                 self._wake.clear()
                 self._serve()
                 self._restart_pacer()
+                self._outputs.tick(self.timeline.now)
+            elif self._requests and self._until_message() > LONGEST_WAIT:
+                self.timeline.restart(self._config.physics_rate)  # which makes one due now
+                self._arrive(serve=True)
             else:
                 self._advance(self._due(), serve=True)
 
@@ -178,8 +188,17 @@ class SimLoop(threading.Thread):
         """Say whether time need not go on: as fast as possible, and nothing is in the air."""
         if self._config.real_time_factor > 0.0:
             return False
+        if self.timeline.steps % self._config.steps_per_publish:
+            return False  # on to the message that shows the disc where it landed
         flying = self._sim is not None and not self._sim.landed
         return not (flying or self._throw_at < math.inf or self.commands.throw.waiting)
+
+    def _until_message(self) -> float:
+        """Return the wall time until the next message is due [s]."""
+        if self._config.real_time_factor == 0.0:
+            return 0.0
+        every = self._config.steps_per_publish
+        return self.pacer.wait(time.monotonic(), every - self.timeline.steps % every)
 
     def _due(self) -> int:
         """Return how many steps are due, after sleeping until it is time for some."""
@@ -205,6 +224,7 @@ class SimLoop(threading.Thread):
     def _advance(self, steps: int, *, serve: bool) -> None:
         """Make steps, stopping at each where a command begins or ends or a message is due."""
         time_, every = self.timeline, self._config.steps_per_publish
+        restarts = self.pacer.restarts
         while steps > 0:
             self._change()
             change = min(self.commands.next_time(), self._held.next_time())
@@ -218,8 +238,10 @@ class SimLoop(threading.Thread):
             if time_.steps % every == 0:
                 paused = self.paused
                 self._arrive(serve=serve)
-                if self.paused != paused or every != self._config.steps_per_publish:
+                if self.paused != paused or self.pacer.restarts != restarts:
                     return
+            else:
+                self._outputs.tick(time_.now, patience=topics.CLOCK_PERIOD)
 
     def _fly(self, steps: int) -> None:
         sim = self._sim
@@ -253,6 +275,8 @@ class SimLoop(threading.Thread):
     def _serve(self) -> None:
         while self._requests:
             action, future = self._requests.popleft()
+            if not future.set_running_or_notify_cancel():
+                continue
             try:
                 future.set_result(action())
             except DiscSimError as error:
@@ -275,8 +299,9 @@ class SimLoop(threading.Thread):
         except ConfigError as error:
             if release is None:
                 raise
+            self.commands.throw.accepted -= 1
             self.commands.throw.drop(str(error))
-            self._warn(f'throw dropped: {error}')
+            self._warn(f'throw dropped: {error}', topics.THROW)
             return
         sim.take(self._held.control)
         self._sim = sim
@@ -290,6 +315,7 @@ class SimLoop(threading.Thread):
         text = configuration_text(config, setup, sim.release, self._flight)
         out.released(self._released, sim.state, text, setup.disc.diameter)
         self._publish_wind()
+        self._publish_held()
         speed = math.hypot(*sim.state[3:6])
         values = {'flight': self._flight, 'speed_m_s': speed, 'spin_rad_s': sim.state.r}
         self._event('thrown', f'{speed:.2f} m/s, spin {sim.state.r:.2f} rad/s', values)
@@ -303,11 +329,11 @@ class SimLoop(threading.Thread):
 
     def _take_config(self) -> None:
         """Make the newest parameters those of the flight that begins."""
-        rate = self._config.physics_rate
-        self._config = self._next_config
-        if self._config.physics_rate != rate:
-            self.timeline.restart(self._config.physics_rate)
-        self._restart_pacer()
+        before, self._config = self._config, self._next_config
+        now = self._config
+        if (now.physics_rate, now.publish_rate) != (before.physics_rate, before.publish_rate):
+            self.timeline.restart(now.physics_rate)
+            self._restart_pacer()
 
     def _tell_landing(self, sim: FlightSimulator) -> None:
         self.counts.landings += 1
@@ -315,10 +341,9 @@ class SimLoop(threading.Thread):
         distance = math.hypot(touch.X - release.X, touch.Y - release.Y)
         x, y, _ = axes.turned((touch.X, touch.Y, touch.Z))
         values = {
+            'stamp_s': in_seconds(self._released + round(sim.touch_time * NANOSECONDS)),
             'flight': self._flight,
             'flight_time_s': sim.touch_time,
-            'landing_stamp_s': (self._released + round(sim.touch_time * NANOSECONDS))
-            / NANOSECONDS,
             'range_m': distance,
             'landing_x_m': x,
             'landing_y_m': y,
@@ -331,7 +356,7 @@ class SimLoop(threading.Thread):
     def _poll(self) -> None:
         self.commands.poll(
             self.timeline.now,
-            lambda topic: self._warn(f'{topic.name} dropped: {topic.reason}'),
+            lambda topic: self._warn(f'{topic.name} dropped: {topic.reason}', topic.name),
         )
 
     def _change(self) -> None:
@@ -390,6 +415,7 @@ class SimLoop(threading.Thread):
 
     def _publish(self) -> None:
         out, sim, now = self._outputs, self._sim, self.timeline.now
+        out.tick(now)
         s = self._resting if sim is None else sim.state
         out.motion(now, s)
         if out.quantities_heard:
@@ -418,13 +444,26 @@ class SimLoop(threading.Thread):
         mean = axes.map_from_paper(self._wind.mean) + 0.0
         self._outputs.wind_applied(self.timeline.now, mean.tolist())
 
+    def _publish_held(self) -> None:
+        """Tell again what acts already, for who records from this throw on."""
+        c, now = self._held.control, self.timeline.now
+        if any((c.L, c.M, c.N)):
+            self._outputs.moment_applied(now, (c.L, c.M, c.N, c.axes))
+        if any((c.C_L, c.C_M, c.C_N)):
+            self._outputs.coefficients_applied(now, (c.C_L, c.C_M, c.C_N))
+
     def _event(self, name: str, text: str, values: dict[str, Any], *, bad: bool = False) -> None:
-        stamp = {'stamp_s': f'{self.timeline.now / NANOSECONDS:.9f}'}
+        stamp = {'stamp_s': in_seconds(self.timeline.now)}
         self._outputs.event(name, text, stamp | values, bad=bad)
 
     def _restart_pacer(self) -> None:
         factor = max(self._config.real_time_factor, 1e-9)
         self.pacer.restart(self._config.setup.step, factor, time.monotonic())
+
+
+def in_seconds(nanoseconds: int) -> str:
+    """Return a time in seconds, exact: as floats, times of today have steps of 240 ns."""
+    return f'{nanoseconds // NANOSECONDS}.{nanoseconds % NANOSECONDS:09d}'
 
 
 def at_rest(s: State) -> State:

@@ -1,9 +1,11 @@
 """`sim_node`: the disc in real time on ROS 2."""
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
+import os
+import re
 import signal
 import sys
-import threading
 import time
 from typing import Any
 
@@ -15,14 +17,16 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.logging_severity import LoggingSeverity
+from rclpy.logging import set_logger_level
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_srvs.srv import SetBool, Trigger
 
 from disc_sim_ros.core import simulator
-from disc_sim_ros.core.errors import DiscSimError
+from disc_sim_ros.core.errors import ConfigError, DiscSimError
 from disc_sim_ros.nodes import parameters, topics
 from disc_sim_ros.nodes.commands import Commands
 from disc_sim_ros.nodes.outputs import Outputs
@@ -51,6 +55,7 @@ class SimNode(Node):
         self._disc = frames.disc
         outputs = Outputs(self, frames, with_clock=config.publish_clock)
         commands = Commands(self, frames)
+        self._silent_until: dict[str, float] = {}  # by what it is about
         self.loop = SimLoop(config, outputs, commands, first_stamp(config, self), self._warn)
         self.create_service(Trigger, '~/throw', self._on_throw)
         self.create_service(Trigger, '~/reset', self._on_reset)
@@ -92,10 +97,12 @@ class SimNode(Node):
 
     def _do(self, action: Any, response: Any) -> Any:
         """Have the simulation thread act, and tell the caller what came of it."""
+        answer = self.loop.submit(action)
         try:
-            response.message = self.loop.submit(action).result(SERVICE_PATIENCE)
+            response.message = answer.result(SERVICE_PATIENCE)
             response.success = True
         except FutureTimeoutError:
+            answer.cancel()
             response.message = f'the simulation did not answer within {SERVICE_PATIENCE:g} s'
         except DiscSimError as error:
             response.message = str(error)
@@ -159,8 +166,12 @@ class SimNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
-    def _warn(self, text: str) -> None:
-        self._logger.warning(text, throttle_duration_sec=1.0)
+    def _warn(self, text: str, about: str = '') -> None:
+        """Log a line, at most one a second `about` the same thing."""
+        now = time.monotonic()
+        if now >= self._silent_until.get(about, 0.0):
+            self._silent_until[about] = now + 1.0
+            self._logger.warning(text)
 
 
 def first_stamp(config: SimConfig, node: Node) -> int:
@@ -170,38 +181,74 @@ def first_stamp(config: SimConfig, node: Node) -> int:
     return 0 if config.publish_clock else int(node.get_clock().now().nanoseconds)
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node until Ctrl-C or SIGTERM; return 0, or 2 for bad parameters."""
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until Ctrl-C or SIGTERM.
+
+    Returns:
+        The exit code: 0, 1 if the simulation broke down, 2 for bad arguments or parameters.
+    """
+    on_signal(lambda *_: os._exit(0))  # nothing is open yet, and compiling takes its time
     if not simulator.is_ready():
         sys.stderr.write(
             'sim_node: compiling the equations of motion, once on this machine, about 10 s\n'
         )
     simulator.warm_up()
-    ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    signals: list[int] = []  # not an Event: a handler may be interrupted by itself
+    on_signal(lambda number, _: signals.append(number))
     try:
+        init(list(sys.argv if args is None else args))
         node = SimNode()
-    except (DiscSimError, ParameterException) as error:
-        sys.stderr.write(f'sim_node: error: {error}\n')
+    except (DiscSimError, ParameterException, RuntimeError) as error:  # RuntimeError: of ROS
+        sys.stderr.write(f'sim_node: error: {plainly(error)}\n')
         try_shutdown()
         return 2
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     node.start()
     try:
-        while not ended.is_set() and node.loop.is_alive():
+        while not signals and node.loop.is_alive():
             executor.spin_once(0.5)
     except RCLError:
         if ok():
             raise
     finally:
+        broken = not node.loop.is_alive()
         node.stop()
         executor.shutdown()
         node.destroy_node()
         try_shutdown()
-    return 0
+    return 1 if broken else 0
+
+
+def on_signal(handler: Callable[..., object]) -> None:
+    """Have Ctrl-C and SIGTERM handled from now on."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
+
+
+def init(args: list[str]) -> None:
+    """Initialise ROS with the arguments of a program, its name first.
+
+    Raises:
+        ConfigError: An argument that is not for ROS.
+        RuntimeError: ROS does not understand an argument.
+    """
+    set_logger_level('rcl', LoggingSeverity.FATAL)  # it would tell a part of the error, too
+    other = remove_ros_args(args)[1:]
+    if other:
+        raise ConfigError(
+            'arguments', ' '.join(other), 'parameters are -p NAME:=VALUE after --ros-args'
+        )
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    set_logger_level('rcl', LoggingSeverity.UNSET)
+
+
+def plainly(error: Exception) -> str:
+    """Return an error as one line, without where in the sources of ROS it was found."""
+    text = ' '.join(re.sub(r', at /[^\s,]+', '', str(error)).split())
+    if type(error).__name__ == 'UnknownROSArgsError':
+        return f'unknown arguments after --ros-args: {text}'
+    return re.sub('^(failed to initialize rcl|Failed to parse ROS arguments): ', '', text)
 
 
 if __name__ == '__main__':

@@ -49,6 +49,8 @@ def ros_environment(monkeypatch, tmp_path) -> Iterator[int]:
         monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
         monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'ros_log'))
+        profiles = Path(__file__).with_name('fast_dds.xml')
+        monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
         yield domain
 
 
@@ -60,3 +62,12 @@ def ros_context(ros_environment):
     context.init(args=[])
     yield context
     context.try_shutdown()
+
+
+@pytest.fixture
+def ros(ros_context, tmp_path):
+    """A node that starts simulators and talks to them, see `sim_process.Harness`."""
+    from nodes.sim_process import Harness
+
+    with Harness(ros_context, tmp_path) as harness:
+        yield harness

@@ -1,0 +1,131 @@
+"""docs/topics.md names what sim_node publishes, takes, offers and tells, and nothing else."""
+
+from collections.abc import Iterator
+import dataclasses
+from pathlib import Path
+import re
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from disc_sim_ros.nodes import conversions, outputs, topics
+from disc_sim_ros.nodes.topics import Frames
+
+ROOT = Path(__file__).parents[2]
+NODES = ROOT / 'disc_sim_ros/nodes'
+PAGE = (ROOT / 'docs/topics.md').read_text(encoding='utf-8')
+TAKEN = {topics.CMD_MOMENT, topics.CMD_COEFFICIENTS, topics.WIND, topics.THROW}
+
+
+def rows(heading: str) -> Iterator[list[str]]:
+    """Yield the cells of the tables under a heading of any level, up to the next heading."""
+    section = re.split(rf'^#+ {heading}$', PAGE, flags=re.MULTILINE)[1]
+    section = re.split(r'^#+ ', section, flags=re.MULTILINE)[0]
+    for line in section.splitlines():
+        if line.startswith('| `'):
+            yield [cell.strip() for cell in line.strip('|').split('|')]
+
+
+def named(heading: str) -> list[str]:
+    return [row[0].strip('`') for row in rows(heading)]
+
+
+def source(name: str) -> str:
+    return (NODES / f'{name}.py').read_text(encoding='utf-8')
+
+
+def test_every_topic_is_there_and_no_other():
+    constants = {
+        value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)
+    }
+    page = named('Published') + named('Taken')
+    assert len(page) == len(set(page))
+    assert set(page) == constants - {topics.SPIN_JOINT}
+    assert set(named('Taken')) == TAKEN
+
+
+def test_types_are_those_of_the_code(types_of_topics):
+    told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Published')}
+    told |= {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Taken')}
+    missing = {topics.TF} if outputs.TFMessage is None else set()
+    assert {name: told[name] for name in told.keys() - missing} == types_of_topics
+    assert told[topics.TF] == 'TFMessage'
+
+
+@pytest.fixture
+def types_of_topics() -> dict[str, str]:
+    """The types of all topics, found by making them with a node that only takes note."""
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    from disc_sim_ros.nodes.commands import Commands
+
+    class Note:
+        """Stands in for a node, so that this page is tested without a network."""
+
+        def __init__(self):
+            self.types = {topics.DIAGNOSTICS: DiagnosticArray.__name__}  # made by the node itself
+
+        def create_publisher(self, kind, name, *_, **__):
+            self.types[name] = kind.__name__
+            return type('Publisher', (), {'publish': None})
+
+        def create_subscription(self, kind, name, *_, **__):
+            self.types[name] = kind.__name__
+
+        def get_fully_qualified_name(self):
+            return '/sim_node'
+
+    note = Note()
+    outputs.Outputs(note, Frames(), with_clock=True)
+    Commands(note, Frames())
+    return note.types
+
+
+def test_latched_topics_are_called_so():
+    latched = set(re.findall(r'topics\.(\w+), topics\.LATCHED_QOS', source('outputs')))
+    told = {row[0].strip('`') for row in rows('Published') if 'latched' in row[-1]}
+    assert told == {getattr(topics, name) for name in latched}
+    assert len(told) == 3
+
+
+def test_every_service_is_there_and_no_other():
+    made = re.findall(r"create_service\((\w+), '([^']+)'", source('sim_node'))
+    told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Services')}
+    assert told == {name: kind for kind, name in made}
+
+
+def test_every_event_is_there_and_no_other():
+    assert set(named('Events')) == set(re.findall(r"_event\('([^']+)'", source('sim_loop')))
+
+
+def test_every_value_of_an_event_is_there():
+    events = re.split('^### Events$', PAGE, flags=re.MULTILINE)[1].partition('\n## ')[0]
+    told = set(re.findall(r'`(\w+)`', events))
+    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim_loop'))
+    assert set(made) <= told
+
+
+def test_every_frame_is_there_and_no_other():
+    assert named('Frames') == [field.default for field in dataclasses.fields(Frames)]
+
+
+def test_limits_are_those_of_the_code():
+    taken = {row[0].strip('`'): row[2] for row in rows('Taken')}
+    assert f'up to {conversions.LARGEST_MOMENT:g} N m' in taken[topics.CMD_MOMENT]
+    assert f'up to {conversions.LARGEST_COEFFICIENT:g}' in taken[topics.CMD_COEFFICIENTS]
+    assert f'up to {conversions.LARGEST_WIND:g} m/s' in taken[topics.WIND]
+    assert f'up to {conversions.LARGEST_POSITION / 1000:g} km' in taken[topics.THROW]
+    assert f'up to {conversions.LARGEST_SPEED:g} m/s' in taken[topics.THROW]
+    assert f'up to {conversions.LARGEST_RATE:g} rad/s' in taken[topics.THROW]
+
+
+def test_numbers_of_the_text_are_those_of_the_code():
+    from disc_sim_ros.nodes import commands, pacer
+
+    assert f'the last {outputs.LONGEST_PATH}' in PAGE
+    assert f'At most {commands.MOST_WAITING} of a topic' in PAGE
+    assert f'up to {pacer.CATCH_UP:g} s of wall time' in PAGE
+    assert f'every {topics.CLOCK_PERIOD * 1000:g} ms of wall time' in PAGE
+    assert f'keeps the last {topics.STATE_QOS.depth} messages' in PAGE
+    assert f'Reliable, the last {topics.COMMAND_QOS.depth}.' in PAGE

@@ -1,0 +1,159 @@
+"""The examples, started as their first lines say, against a simulator in its own process."""
+
+import importlib.util
+import itertools
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Odometry
+
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.equations import Control
+from disc_sim_ros.core.flight import Setup, fly
+from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.nodes import topics
+
+pytestmark = pytest.mark.ros
+
+EXAMPLES = Path(__file__).parents[2] / 'examples'
+FRISBEE = Setup(disc=catalogue.load('frisbee'))
+WAITING = {'auto_throw': False, 'real_time_factor': 4.0}
+DEADLINE = 60.0  # s
+
+
+def start(name: str, *arguments: str) -> subprocess.Popen:
+    return subprocess.Popen(
+        [sys.executable, EXAMPLES / name, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def run(name: str, *arguments: str, code: int = 0) -> str:
+    """Run an example to its end and return what it printed."""
+    process = start(name, *arguments)
+    try:
+        output, errors = process.communicate(timeout=DEADLINE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        pytest.fail(f'{name} did not end:\n{process.communicate()}')
+    assert process.returncode == code, f'{output}\n{errors}'
+    assert errors == ''
+    return output
+
+
+@pytest.fixture
+def load(ros_environment):
+    """A function that loads an example, to call its `main` in the test's process."""
+
+    def loaded(name: str):
+        spec = importlib.util.spec_from_file_location(Path(name).stem, EXAMPLES / name)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return loaded
+
+
+def landings(events: list[DiagnosticStatus]) -> list[DiagnosticStatus]:
+    return [event for event in events if event.name.endswith(': landed')]
+
+
+@pytest.mark.parametrize('namespace', ['', '/red'])
+def test_throw_throws_what_the_core_flies(ros, namespace):
+    ros.start(WAITING, namespace=namespace)
+    events = ros.listen(DiagnosticStatus, f'{namespace}/{topics.FLIGHT_EVENTS}')
+    odometry = ros.listen(Odometry, f'{namespace}/{topics.ODOM}')
+    ros.spin_until(lambda: odometry, 'odometry')  # then it knows of both subscriptions
+    launch = {'speed': 18.0, 'pitch': 12.0, 'roll': 7.0, 'yaw': 25.0, 'spin': 40.0, 'height': 1.2}
+    options = itertools.chain(*((f'--{name}', str(value)) for name, value in launch.items()))
+    remap = ('--ros-args', '-r', f'__ns:={namespace}') if namespace else ()
+    output = run('throw.py', *options, *remap)
+    flight = fly(Launch(**launch), FRISBEE)
+    assert output.splitlines() == [
+        'thrown: 18.00 m/s, spin 40.00 rad/s',
+        f'landed: {flight.range:.2f} m in {flight.time:.3f} s',
+    ]
+    ros.spin_until(lambda: landings(events), 'the landing')
+    found = {pair.key: float(pair.value) for pair in landings(events)[0].values}
+    assert found['landing_x_m'] == pytest.approx(flight.position[0], abs=1e-9)
+    assert found['landing_y_m'] == pytest.approx(flight.position[1], abs=1e-9)
+
+
+def test_throw_takes_a_disc_out_of_the_air_and_follows_its_own(ros):
+    ros.start({'real_time_factor': 4.0, 'launch.speed': 30.0, 'launch.height': 1000.0})
+    output = run('throw.py', '--speed', '15')
+    assert output.splitlines()[-2:] == [
+        'thrown: 15.00 m/s, spin 31.42 rad/s',
+        'landed: 26.35 m in 3.669 s',
+    ]
+
+
+def test_throw_says_that_there_is_no_simulator(load, capsys):
+    module = load('throw.py')
+    module.PATIENCE = 0.5
+    assert module.main([]) == 1
+    assert 'no simulator' in capsys.readouterr().err
+
+
+def test_throw_says_that_the_simulator_refused(ros, load, capsys):
+    sim = ros.start(WAITING)
+    module = load('throw.py')
+    module.PATIENCE = 3.0
+    ros.spin_until(lambda: ros.node.count_subscribers(topics.THROW), 'the simulator')
+    assert module.main(['--height', '-1']) == 1
+    assert 'it did not throw' in capsys.readouterr().err
+    ros.spin_until(lambda: 'release at 0 m or above' in sim.stderr, 'a warning of the simulator')
+
+
+def test_main_can_be_called(ros, load, capsys):
+    ros.start(WAITING)
+    assert load('throw.py').main(['--speed', '15']) == 0
+    assert 'landed: 26.35 m in 3.669 s' in capsys.readouterr().out
+
+
+def test_throw_can_be_interrupted(ros):
+    ros.start(WAITING)
+    process = start('throw.py', '--height', '5000')
+    assert process.stdout.readline().startswith('thrown')
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, errors) == (1, '')
+
+
+def test_steer_turns_the_flight_as_the_core_says(ros):
+    ros.start(WAITING)
+    output = run('steer.py', '--command', '0.001', '0.005', '0.002')
+    ends = [
+        list(map(float, re.findall(r'-?\d+\.\d\d(?= m)', line))) for line in output.splitlines()
+    ]
+    for end, control in zip(ends, (None, Control(0.001, 0.005, 0.002)), strict=True):
+        flight = fly(Launch(), FRISBEE, control=control) if control else fly(Launch(), FRISBEE)
+        # The first command comes a step or so before or after the release.
+        assert end == pytest.approx(flight.position[:2], abs=0.02)
+    assert abs(ends[1][1] - ends[0][1]) > 1.0
+
+
+def test_steer_says_that_there_is_no_simulator(load, capsys):
+    module = load('steer.py')
+    module.PATIENCE = 0.5
+    assert module.main([]) == 1
+    assert 'no simulator' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['throw.py', 'steer.py'])
+def test_help_tells_units_and_a_wrong_flag_ends_with_2(name, ros_environment):
+    assert 'usage' in run(name, '--help')
+    process = start(name, '--sped', '3')
+    _, errors = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 2
+    assert '--sped' in errors
