@@ -1,8 +1,8 @@
 """What sim_node costs, how late it is and how fast it starts, beside the naive way.
 
 Every figure is measured in this run with real processes: the node, one that subscribes to `odom`
-and `pose`, one that sends commands. CPU is that of the node's process, per cent of one core. The
-naive way is the same physics in an rclpy timer, with fresh messages and an executor's subscription.
+and `pose`, one that sends commands. CPU is that of the node's process, per cent of one core.
+The naive way is the same physics in an rclpy timer, fresh messages, an executor's subscription.
 
 usage: benchmarks/node.py [seconds of each measurement]
 """

@@ -10,8 +10,6 @@ import tempfile
 
 import pytest
 
-os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first imported
-
 DOMAINS = range(1, 102)  # above, the ports of Fast DDS are among those the system hands out
 
 

@@ -9,6 +9,7 @@ import time
 from typing import Any
 
 import pytest
+from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -81,6 +82,7 @@ class Harness:
         self._folder = folder
         self._clients: dict[str, Client] = {}
         self._parameters: dict[SimProcess, AsyncParameterClient] = {}
+        self._reached: set[str] = set()  # names of simulators that know all clients
         self._heard: list[list[Any]] = []
         self._since = 0
 
@@ -106,7 +108,6 @@ class Harness:
         stderr = self._folder / f'sim_{len(self.sims)}.txt'
         sim = SimProcess(parameters, arguments, f'{namespace}/sim_node', stderr)
         self.sims.append(sim)
-        # A server knows the clients that are older than it when it can be seen.
         self._client(sim, 'pause', SetBool)
         for service in ('throw', 'reset', 'step'):
             self._client(sim, service, Trigger)
@@ -160,6 +161,7 @@ class Harness:
     def call(self, sim: SimProcess, service: str, kind: type = Trigger, **fields: Any) -> Any:
         """Call a service of a simulator, such as 'throw', and return the response."""
         client = self._client(sim, service, kind)
+        self._reach(sim)
         self.spin_until(client.service_is_ready, f'the service {client.srv_name}')
         return self._result(sim, client.call_async(kind.Request(**fields)))
 
@@ -170,6 +172,7 @@ class Harness:
     def set(self, sim: SimProcess, parameters: Mapping[str, object]) -> Any:
         """Set parameters of a simulator together; return rcl_interfaces/SetParametersResult."""
         client = self._parameters[sim]
+        self._reach(sim)
         self.spin_until(client.services_are_ready, f'the parameters of {sim.name}')
         changes = [Parameter(key, value=x).to_parameter_msg() for key, x in parameters.items()]
         return self._result(sim, client.set_parameters_atomically(changes)).result
@@ -178,7 +181,34 @@ class Harness:
         name = f'{sim.name}/{service}'
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
+            self._reached.discard(sim.name)
         return self._clients[name]
+
+    def _reach(self, sim: SimProcess) -> None:
+        """Wait until a simulator can answer every client that has been made so far.
+
+        A server drops its answer to a client that it does not know yet. Discovery keeps the order
+        of clients: when the youngest has been answered, the older ones will be.
+        """
+        if sim.name in self._reached:
+            return
+        client = self.node.create_client(GetParameters, f'{sim.name}/get_parameters')
+        answers: list[Future] = []
+
+        def answered() -> bool:
+            return any(answer.done() for answer in answers)
+
+        def asked() -> bool:
+            answers.append(client.call_async(GetParameters.Request()))
+            patience = time.monotonic() + 0.2
+            while not answered() and time.monotonic() < patience:
+                self._executor.spin_once(0.02)
+            return answered()
+
+        self.spin_until(client.service_is_ready, f'the service {client.srv_name}')
+        self.spin_until(asked, f'an answer of {sim.name}')
+        self.node.destroy_client(client)
+        self._reached.add(sim.name)
 
     def _result(self, sim: SimProcess, future: Future) -> Any:
         self.spin_until(future.done, f'an answer of {sim.name}')
