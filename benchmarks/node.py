@@ -264,22 +264,20 @@ def listen(seconds: str, *names: str) -> None:
     del seconds
     rclpy.init()
     node = rclpy.create_node('listener')
-    count = [0]
-    for i, name in enumerate(names):
-        mine = count if i == 0 else [0]
-
-        def add(_: bytes, mine: list[int] = mine) -> None:
-            mine[0] += 1
-
-        node.create_subscription(TYPES[name], name, add, DEEP, raw=True)
+    never = [node.create_subscription(TYPES[name], name, print, DEEP) for name in names]
+    readers = [(reader.handle, TYPES[name]) for reader, name in zip(never, names, strict=True)]
+    counts = [0] * len(readers)
     first = None
     try:
         while True:
-            rclpy.spin_once(node)
-            if first is None:
-                first, count[0] = time.monotonic(), 0
-    except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
-        print(count[0] / (time.monotonic() - (first or 0.0)))
+            for k, (reader, kind) in enumerate(readers):
+                while reader.take_message(kind, True) is not None:  # noqa: FBT003 - raw
+                    counts[k] += 1
+            if first is None and counts[0]:
+                first, counts[0] = time.monotonic(), 0
+            time.sleep(1e-3)
+    except KeyboardInterrupt:
+        print(counts[0] / (time.monotonic() - (first or 0.0)))
 
 
 def command(rate: str) -> None:

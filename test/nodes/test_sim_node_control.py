@@ -931,7 +931,7 @@ def test_who_comes_late_sees_the_disc_and_its_path(ros):
     paths = ros.listen(PathMessage, 'path')
     transforms = ros.listen(TransformStamped, 'transform')
     ros.spin_until(
-        lambda: releases and all(latched.values()) and len(paths) > 3 and len(transforms) > 3,
+        lambda: releases and all(latched.values()) and len(paths) > 3 and len(transforms) > 8,
         'all of them',
     )
     assert yaml.safe_load(latched[String][0].data)['flight'] == 1
