@@ -96,7 +96,7 @@ def measured(
         node = stack.enter_context(simulator(physics, publish, naive=naive))
         listener = None
         if listened:
-            listener = stack.enter_context(role('listen', str(seconds), *listened))
+            listener = stack.enter_context(role('listen', *listened))
         if command_rate:
             stack.enter_context(role('command', str(command_rate)))
         time.sleep(2.0)  # discovery
@@ -259,13 +259,12 @@ def start_time(**environment: str) -> float:
 # ---- roles of other processes ----
 
 
-def listen(seconds: str, *names: str) -> None:
+def listen(*names: str) -> None:
     """Count the messages of the first of these topics, and print how many a second."""
-    del seconds
     rclpy.init()
     node = rclpy.create_node('listener')
-    never = [node.create_subscription(TYPES[name], name, print, DEEP) for name in names]
-    readers = [(reader.handle, TYPES[name]) for reader, name in zip(never, names, strict=True)]
+    subscriptions = [node.create_subscription(TYPES[name], name, print, DEEP) for name in names]
+    readers = [(s.handle, TYPES[name]) for s, name in zip(subscriptions, names, strict=True)]
     counts = [0] * len(readers)
     first = None
     try:

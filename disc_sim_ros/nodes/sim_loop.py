@@ -154,8 +154,9 @@ class SimLoop(threading.Thread):
         before, self._next_config = self._next_config, config
         changed = {name: getattr(config, name) for name in _AT_ONCE}
         self._config = replace(self._config, **changed)
-        if config.setup.wind != before.setup.wind:
-            self._blow(config.setup.wind)
+        old, new = before.setup.wind, config.setup.wind
+        if replace(new, turbulence=old.turbulence, seed=old.seed) != old:
+            self._blow(new)  # gusts wait for the next throw, and do not undo a commanded wind
         if config.throw_period != before.throw_period and self._flight:
             self._throw_at = self._after_period()
         if config.real_time_factor != before.real_time_factor:

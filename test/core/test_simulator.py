@@ -40,6 +40,19 @@ def test_steps_of_any_number_are_the_flight(model, wind, chunk):
         assert np.array_equal(flown, whole.trajectory.rows[1:, 1:15])
 
 
+@pytest.mark.parametrize(
+    ('roll', 'pitch', 'yaw'), [(25, 30, 76), (36, 51, -31), (-34, 27, -16), (-28, 13, 16)]
+)
+def test_a_tilted_release_is_completed_once(roll, pitch, yaw):
+    """These quaternions move by their last bit when they are made unit ones a second time."""
+    launch = Launch(roll=roll, pitch=pitch, yaw=yaw, height=5.0)
+    setup = Setup(disc=FRISBEE)
+    sim = FlightSimulator(setup, launch.state())
+    while not sim.landed:
+        sim.advance(50)
+    assert sim.touch == fly(launch, setup).end
+
+
 def test_a_landed_disc_lies_still():
     sim = FlightSimulator(Setup(disc=FRISBEE), LAUNCH.state())
     sim.advance(10_000)
