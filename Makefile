@@ -29,7 +29,7 @@ test: setup-test ## setup, then every test, ruff, mypy and the import rules
 lint: setup-test ## the same without the tests
 	@tools/check ruff format mypy imports
 
-fly: setup ## throw the disc of the paper's Fig. 5 (DISC=wraith THROW='--speed 20 --pitch 10')
+fly: setup ## throw the disc of the paper's Fig. 5 (DISC=wraith THROW='--speed 25 --spin 120')
 	@mkdir -p flights
 	@$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW)
 
