@@ -10,8 +10,15 @@ NAME = 'disc_sim_ros'
 
 # A new executable is one line here and one file in scripts/, a copy of scripts/fly with its name.
 EXECUTABLES = {
+    'analyse_bag': 'disc_sim_ros.cli.analyse_bag:main',
+    'demo': 'disc_sim_ros.cli.demo:main',
     'fly': 'disc_sim_ros.cli.fly:main',
+    'optimise': 'disc_sim_ros.cli.optimise:main',
+    'paper_figures': 'disc_sim_ros.cli.paper_figures:main',
+    'recorder_node': 'disc_sim_ros.cli.recorder_node:main',
+    'repair_bag': 'disc_sim_ros.cli.repair_bag:main',
     'sim_node': 'disc_sim_ros.cli.sim_node:main',
+    'sweep': 'disc_sim_ros.cli.sweep:main',
 }
 
 SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz')
@@ -76,6 +83,12 @@ setup(
         'numba>=0.60,<1',
         'PyYAML>=6.0,<7',
         'matplotlib>=3.8,<4',
+        'lz4>=4.3,<5',
+        'mcap>=1.2,<2',
+        'mcap-ros2-support>=0.5.5,<1',
+        'pyarrow>=15,<30',
+        'scipy>=1.11,<2',
+        'zstandard>=0.22,<1',
     ],
     extras_require={
         # Only for people without a ROS installation. Always the ros-jazzy- names: the bare ones
@@ -84,11 +97,15 @@ setup(
             'ros-jazzy-rclpy[fastrtps]',
             'ros-jazzy-common-interfaces',
         ],
+        # `sweep --dask`.
+        'dask': ['dask>=2024.5', 'distributed>=2024.5'],
         'test': [
+            'dask>=2024.5',
+            'distributed>=2024.5',
             'pytest>=8,<10',
             'pytest-timeout>=2.3,<3',
             'hypothesis>=6.100,<7',
-            'scipy>=1.11,<2',
+            'rosbags>=0.10.4,<1',
             'ruff>=0.14,<1',
             'mypy>=1.15,<3',
             'types-PyYAML',

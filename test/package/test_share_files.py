@@ -20,7 +20,7 @@ pytest.importorskip('rclpy')
 
 from disc_sim_ros.core import catalogue
 from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes import conversions, outputs, topics
+from disc_sim_ros.nodes import conversions, markers, topics
 from disc_sim_ros.nodes.parameter_table import TABLE
 from disc_sim_ros.nodes.sim_config import configuration
 from disc_sim_ros.nodes.topics import Frames
@@ -290,7 +290,7 @@ def test_mass_inertia_and_size_are_those_of_the_catalogue(urdf):
     assert 0.0 < z <= 2.0 * x
     (cylinder,) = urdf.iter('cylinder')
     assert float(cylinder.get('radius')) == pytest.approx(disc.diameter / 2)
-    assert float(cylinder.get('length')) == pytest.approx(outputs.RIM_HEIGHT * disc.diameter)
+    assert float(cylinder.get('length')) == pytest.approx(markers.RIM_HEIGHT * disc.diameter)
 
 
 def test_the_mark_is_seen_and_within_the_disc(urdf):
@@ -314,30 +314,31 @@ def rviz() -> dict:
 
 def displays(rviz: dict) -> dict[str, dict]:
     found = rviz['Visualization Manager']['Displays']
-    return {display['Class'].removeprefix('rviz_default_plugins/'): display for display in found}
+    return {display['Name']: display for display in found}
 
 
 def test_rviz_shows_topics_that_exist_as_they_are_published(rviz):
     shown = displays(rviz)
     expected = {
         'Path': topics.PATH,
-        'MarkerArray': topics.MARKERS,
+        'Disc': topics.MARKERS,
+        'Field': topics.FIELD_MARKERS,
         'Pose': topics.POSE,
         'Odometry': topics.ODOM,
     }
-    assert {kind: shown[kind]['Topic']['Value'] for kind in expected} == expected
-    assert {kind for kind, display in shown.items() if 'Topic' in display} == set(expected)
-    for kind in expected:
-        latched = kind == 'MarkerArray'
+    assert {name: shown[name]['Topic']['Value'] for name in expected} == expected
+    assert {name for name, display in shown.items() if 'Topic' in display} == set(expected)
+    for name in expected:
+        latched = name in {'Disc', 'Field'}
         durability = 'Transient Local' if latched else 'Volatile'
-        assert shown[kind]['Topic']['Durability Policy'] == durability
-        assert shown[kind]['Topic']['Reliability Policy'] == 'Reliable'
+        assert shown[name]['Topic']['Durability Policy'] == durability
+        assert shown[name]['Topic']['Reliability Policy'] == 'Reliable'
     assert shown['RobotModel']['Description Topic']['Durability Policy'] == 'Transient Local'
 
 
 def test_rviz_starts_with_what_needs_no_other_node(rviz):
-    enabled = {kind for kind, display in displays(rviz).items() if display['Enabled']}
-    assert enabled == {'Grid', 'TF', 'Path', 'MarkerArray', 'Pose'}
+    enabled = {name for name, display in displays(rviz).items() if display['Enabled']}
+    assert enabled == {'Ground, 1 m', 'TF', 'Path', 'Disc', 'Field', 'Pose'}
     for display in displays(rviz).values():
         assert display['Enabled'] is display['Value']
 
@@ -408,7 +409,10 @@ KEYS = dict.fromkeys(
     ('diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'),
     'common_interfaces',
 ) | {'visualization_msgs': 'common_interfaces', 'yaml': 'python3-yaml'}
-KEYS |= {name: f'python3-{name}' for name in ('matplotlib', 'numba', 'numpy', 'scipy')}
+KEYS |= {
+    name: f'python3-{name}'
+    for name in ('lz4', 'matplotlib', 'numba', 'numpy', 'pyarrow', 'scipy', 'zstandard')
+} | {'mcap': 'python3-mcap-pip', 'mcap_ros2': 'python3-mcap-ros2-support-pip'}
 STARTED = {'ros2launch', 'ros2bag', 'rosbag2_storage_mcap', 'ros2service'}  # by or as launch files
 
 

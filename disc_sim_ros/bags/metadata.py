@@ -1,0 +1,211 @@
+"""metadata.yaml: what rosbag2 says of a whole bag, version 9 as Jazzy writes it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import re
+from typing import Any
+
+import yaml
+
+from disc_sim_ros.bags import qos
+from disc_sim_ros.bags.errors import BagError
+from disc_sim_ros.bags.topic import Topic
+
+FILE_NAME = 'metadata.yaml'
+RECORD = 'rosbag2'  # the MCAP metadata record that holds the same text
+KEY = 'serialized_metadata'
+VERSION = 9
+NO_TIME = 9223372036854775807  # ns, rosbag2's starting time of a bag without messages
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileInfo:
+    """One file of a bag. Times are nanoseconds of the log time."""
+
+    path: str  # relative to the folder of the bag
+    message_count: int = 0
+    start: int = 0
+    end: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicInfo:
+    """A topic and how many messages of it there are."""
+
+    topic: Topic
+    message_count: int
+
+    @property
+    def name(self) -> str:
+        """The name of the topic."""
+        return self.topic.name
+
+    @property
+    def type(self) -> str:
+        """The type of its messages."""
+        return self.topic.type
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagMetadata:
+    """What metadata.yaml holds."""
+
+    topics: tuple[TopicInfo, ...] = ()
+    files: tuple[FileInfo, ...] = ()
+    custom_data: Mapping[str, str] = field(default_factory=dict)
+    ros_distro: str = 'jazzy'
+    storage: str = 'mcap'
+    compression_mode: str = ''
+    message_count: int = 0  # when read; written are the sums
+
+
+def text_of(metadata: BagMetadata) -> str:
+    """Return metadata as the YAML of rosbag2, every field in its order."""
+    filled = [f for f in metadata.files if f.message_count]
+    start = min((f.start for f in filled), default=NO_TIME)
+    end = max((f.end for f in filled), default=NO_TIME)
+    lines = [
+        'rosbag2_bagfile_information:',
+        f'  version: {VERSION}',
+        '  storage_identifier: mcap',
+        '  duration:',
+        f'    nanoseconds: {end - start}',
+        '  starting_time:',
+        f'    nanoseconds_since_epoch: {start}',
+        f'  message_count: {sum(f.message_count for f in metadata.files)}',
+        *_block('topics_with_message_count', [_topic(t) for t in metadata.topics]),
+        '  compression_format: ""',
+        '  compression_mode: ""',
+        *_block('relative_file_paths', [[scalar(f.path)] for f in metadata.files]),
+        *_block('files', [_file(f) for f in metadata.files]),
+    ]
+    if metadata.custom_data:
+        lines.append('  custom_data:')
+        lines += [f'    {scalar(k)}: {scalar(v)}' for k, v in metadata.custom_data.items()]
+    else:
+        lines.append('  custom_data: ~')
+    lines.append(f'  ros_distro: {scalar(metadata.ros_distro)}')
+    return '\n'.join(lines) + '\n'
+
+
+def parse(text: str) -> BagMetadata:
+    """Read metadata.yaml of this or an older version.
+
+    Raises:
+        BagError: It is no such YAML.
+    """
+    try:
+        root = yaml.load(text, Loader=_LOADER)['rosbag2_bagfile_information']  # noqa: S506 - a SafeLoader
+        return BagMetadata(
+            topics=tuple(_parsed_topic(t) for t in root['topics_with_message_count'] or ()),
+            files=tuple(_parsed_files(root)),
+            custom_data={str(k): str(v) for k, v in (root.get('custom_data') or {}).items()},
+            ros_distro=str(root.get('ros_distro') or ''),
+            storage=str(root['storage_identifier']),
+            compression_mode=str(root.get('compression_mode') or '').lower(),
+            message_count=int(root['message_count']),
+        )
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+        reason = ' '.join(str(error).split())
+        raise BagError(f'no metadata of rosbag2 ({type(error).__name__}: {reason})') from None
+
+
+def scalar(text: str) -> str:
+    """Return any text as one YAML scalar, plain where that is safe."""
+    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
+        return text
+    return '"' + ''.join(_ESCAPES.get(c) or _escaped(c) for c in text) + '"'
+
+
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_PLAIN = re.compile(r'[A-Za-z/_][A-Za-z0-9/_]*(\.mcap)?', re.ASCII)
+_WORDS = frozenset(('null', 'true', 'false', 'yes', 'no', 'on', 'off', 'y', 'n'))
+_ESCAPES = {'"': '\\"', '\\': '\\\\', '\n': '\\n', '\t': '\\t', '\r': '\\r', '\0': '\\0'}
+
+
+def _escaped(c: str) -> str:
+    if c.isprintable() and not '\ud800' <= c <= '\udfff':
+        return c
+    n = ord(c)
+    if 0xD800 <= n <= 0xDFFF:  # half of a pair is no character
+        return '\ufffd'
+    return f'\\x{n:02x}' if n < 0x100 else f'\\u{n:04x}' if n < 0x10000 else f'\\U{n:08x}'
+
+
+def _block(key: str, items: list[list[str]]) -> list[str]:
+    """Return a sequence of items, each some lines."""
+    if not items:
+        return [f'  {key}: []']
+    lines = [f'  {key}:']
+    for first, *rest in items:
+        lines.append(f'    - {first}')
+        lines += [f'      {line}' for line in rest]
+    return lines
+
+
+def _topic(info: TopicInfo) -> list[str]:
+    topic = info.topic
+    profiles = qos.yaml_list(topic.qos)
+    offered = (
+        [f'  offered_qos_profiles: {profiles}']
+        if profiles == '[]'
+        else ['  offered_qos_profiles:', *(f'    {line}' for line in profiles.split('\n'))]
+    )
+    return [
+        'topic_metadata:',
+        f'  name: {scalar(topic.name)}',
+        f'  type: {scalar(topic.type)}',
+        f'  serialization_format: {scalar(topic.serialization_format)}',
+        *offered,
+        f'  type_description_hash: {scalar(topic.type_hash)}',
+        f'message_count: {info.message_count}',
+    ]
+
+
+def _file(info: FileInfo) -> list[str]:
+    start, end = (info.start, info.end) if info.message_count else (NO_TIME, NO_TIME)
+    return [
+        f'path: {scalar(info.path)}',
+        'starting_time:',
+        f'  nanoseconds_since_epoch: {start}',
+        'duration:',
+        f'  nanoseconds: {end - start}',
+        f'message_count: {info.message_count}',
+    ]
+
+
+def _parsed_topic(item: Any) -> TopicInfo:
+    about = item['topic_metadata']
+    try:
+        profiles = qos.from_items(about.get('offered_qos_profiles') or [])
+    except BagError:
+        profiles = ()
+    return TopicInfo(
+        topic=Topic(
+            name=str(about['name']),
+            type=str(about['type']),
+            serialization_format=str(about['serialization_format']),
+            qos=profiles,
+            type_hash=str(about.get('type_description_hash') or ''),
+        ),
+        message_count=int(item['message_count']),
+    )
+
+
+def _parsed_files(root: Any) -> list[FileInfo]:
+    told = {f['path']: f for f in root.get('files') or ()}
+    files = []
+    for path in root['relative_file_paths'] or ():
+        if path not in told:
+            files.append(FileInfo(path=str(path)))
+            continue
+        start = int(told[path]['starting_time']['nanoseconds_since_epoch'])
+        files.append(
+            FileInfo(
+                path=str(path),
+                message_count=int(told[path]['message_count']),
+                start=start,
+                end=start + int(told[path]['duration']['nanoseconds']),
+            )
+        )
+    return files

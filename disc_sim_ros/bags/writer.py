@@ -1,0 +1,386 @@
+"""Writing a bag: a folder that rosbag2, Foxglove and this package read, safe at any moment."""
+
+from collections.abc import Mapping
+import math
+from pathlib import Path
+import shutil
+import struct
+import time
+from types import TracebackType
+from typing import Self
+
+from disc_sim_ros.bags import disk, metadata
+from disc_sim_ros.bags.errors import BagError, WriteError
+from disc_sim_ros.bags.ledger import Ledger
+from disc_sim_ros.bags.mcap_file import (
+    CHUNK_SIZE,
+    COMPRESSIONS,
+    Definition,
+    McapFile,
+    new_attachment,
+)
+from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.core import check
+
+_MOST_CHANNELS = 65535  # ids are of 16 bits
+_MARGIN = 64 * 1024  # bytes of room kept for the end beside what is counted
+
+
+class BagWriter:
+    """Writes one bag. For one thread; a context manager that closes the bag.
+
+    What was flushed survives the death of the process and of the machine. When the disk is full,
+    `write` or `flush` raises, the messages of the open chunk are dropped and counted in `lost`,
+    and `close` still ends the bag, in room that was kept for it.
+    """
+
+    def __init__(
+        self,
+        folder: Path | str,
+        *,
+        compression: str = 'zstd',
+        flush_period: float = 0.5,
+        max_size: int | None = None,
+        max_duration: float | None = None,
+        custom_data: Mapping[str, str] = {},
+        ros_distro: str = 'jazzy',
+    ) -> None:
+        """Make the folder, its first file and metadata.yaml.
+
+        Args:
+            folder: To be made, with its parents; it must not exist.
+            compression: Of the chunks: 'zstd', 'lz4' or 'none'.
+            flush_period: Longest time that a message waits for the disk [s, wall time], as long
+                as messages come; `flush` is for when they do not.
+            max_size: A file that has reached this size is followed by another [bytes].
+            max_duration: As `max_size`, by log time [s].
+            custom_data: Free texts for metadata.yaml.
+            ros_distro: Of the messages.
+
+        Raises:
+            ConfigError: A value is not allowed, the folder exists or cannot be made.
+            BagError: The system refuses to write in it.
+        """
+        check.choice('compression', compression, COMPRESSIONS)
+        self._period = check.number('flush_period', flush_period, 1e-3, 3600.0, unit='s')
+        self._max_size: float = math.inf
+        if max_size is not None:
+            self._max_size = check.whole_number('max_size', max_size, 1024, 2**62)
+        self._max_duration: float = math.inf
+        if max_duration is not None:
+            seconds = check.number('max_duration', max_duration, 1e-3, 1e9, unit='s')
+            self._max_duration = round(seconds * 1e9)
+        self.folder = disk.new_folder(Path(folder))
+        self.lost = 0  # messages that a full disk cost
+        self.flushed = 0  # messages that the disk has
+        self._compression = compression
+        self._ledger = Ledger(ros_distro, {str(k): str(v) for k, v in custom_data.items()})
+        self._writable: dict[int, Definition] = {}  # by topic id; empty once writing is over
+        self._failure: BagError | None = None
+        self._closed = False
+        self._stale = True  # metadata.yaml does not say all
+        self._synced = 0  # bytes of the open file that the disk has
+        self._chunk_size = min(CHUNK_SIZE, max(4096, self._max_size / 8))
+        self._reserve = disk.Reserve(self.folder)
+        self._turn_at = 0.0  # log time at which another file begins [ns]
+        self._due = 0.0  # when to flush, by the monotonic clock [s]
+        self._file: McapFile = None  # type: ignore[assignment]  # until the next line but one
+        try:
+            self._open_file()
+            self._flush()
+        except OSError as error:
+            self._reserve.release()
+            if self._file is not None:
+                self._file.close()
+            shutil.rmtree(self.folder, ignore_errors=True)
+            why = disk.reason(error)
+            raise WriteError(f'{self.folder}: no bag can be written there ({why})', why) from None
+
+    def add(self, topic: Topic) -> int:
+        """Announce a topic; return the id with which its messages are written."""
+        self._refuse_when_over()
+        if len(self._ledger.topics) == _MOST_CHANNELS:
+            raise BagError(f'{self.folder}: a bag has at most {_MOST_CHANNELS} topics')
+        topic_id = len(self._ledger.topics) + 1
+        self._set(topic_id, topic)
+        return topic_id
+
+    def update(self, topic_id: int, topic: Topic) -> None:
+        """Say something else of a topic: metadata.yaml tells it, and the files still to come."""
+        self._refuse_when_over()
+        before = self._ledger.topics.get(topic_id)
+        if before is None or (before.name, before.type) != (topic.name, topic.type):
+            raise BagError(f'{self.folder}: topic {topic_id} is not {topic.name}')
+        self._set(topic_id, topic)
+
+    def write(
+        self, topic_id: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0
+    ) -> None:
+        """Add a message, as the bytes that came.
+
+        Args:
+            topic_id: From `add`.
+            data: The serialised message.
+            log_time: When it was received [ns].
+            publish_time: When it was sent [ns].
+            sequence: rosbag2 Jazzy leaves it 0.
+
+        Raises:
+            BagError: The id is unknown, a time negative, the bag closed, or the disk full.
+        """
+        try:
+            definition = self._writable[topic_id]
+            if log_time >= self._turn_at:
+                self._turn(log_time)
+            pending = self._file.write(definition, data, log_time, publish_time, sequence)
+        except (KeyError, struct.error):
+            self._refuse_when_over()
+            if topic_id not in self._ledger.topics:
+                raise BagError(f'{self.folder}: no topic has the id {topic_id}') from None
+            raise BagError(
+                f'{self._ledger.topics[topic_id].name}: times must be from 0 to 2^64 - 1 ns, '
+                f'not {log_time} and {publish_time}'
+            ) from None
+        if pending >= self._chunk_size:
+            self._end_chunk()
+        elif time.monotonic() >= self._due:
+            self.flush()
+
+    def flush(self) -> None:
+        """Bring everything to the disk, messages and metadata.yaml.
+
+        Raises:
+            BagError: The system refuses; what was flushed before is safe.
+        """
+        self._refuse_when_over()
+        try:
+            self._flush()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def split(self) -> None:
+        """End the file and begin another; does nothing while the file has no messages.
+
+        Raises:
+            BagError: The system refuses; what was flushed before is safe.
+        """
+        self._refuse_when_over()
+        if not self._file.message_count + self._file.pending_messages:
+            return
+        try:
+            self._hold_reserve()
+            self._file.end_chunk()
+            self._finish_file()
+            self._open_file()
+            self._flush()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def custom(self, key: str, value: str) -> None:
+        """Set a text of `custom_data` in metadata.yaml."""
+        if self._ledger.custom.get(str(key)) != str(value):
+            self._ledger.custom[str(key)] = str(value)
+            self._stale = True
+
+    def attach(
+        self,
+        name: str,
+        media_type: str,
+        data: bytes,
+        *,
+        log_time: int | None = None,
+        create_time: int | None = None,
+    ) -> None:
+        """Put a small file into the bag; times [ns] are now where they are not given.
+
+        Raises:
+            BagError: The system refuses.
+        """
+        self._refuse_when_over()
+        try:
+            self._file.add_attachment(
+                new_attachment(name, media_type, data, log_time, create_time)
+            )
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def note(self, name: str, data: Mapping[str, str]) -> None:
+        """Put an MCAP metadata record into the file.
+
+        Raises:
+            BagError: The system refuses.
+        """
+        self._refuse_when_over()
+        try:
+            self._file.add_metadata(name, dict(data))
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def close(self) -> None:
+        """End the bag with its index; again does nothing.
+
+        Raises:
+            BagError: Messages were lost now, or there is no room for the end. Everything flushed
+                stays readable, and `repair_bag` gives it an end.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        self._writable = {}
+        failure = None
+        if self._failure is None:
+            try:
+                self._file.end_chunk()
+            except OSError as error:
+                failure = self._failed(error)
+        try:
+            self._end_in_reserve()
+        except OSError as error:
+            why = self._reason(error)
+            raise WriteError(
+                f'{self._file.path}: its end cannot be written ({why}); '
+                'what is there stays readable, and `repair_bag` makes it whole',
+                why,
+            ) from None
+        finally:
+            self._file.close()
+            self._reserve.release()
+        if failure is not None:
+            raise failure
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files, the open one last."""
+        return tuple(self.folder / f.path for f in self._ledger.infos(self._file))
+
+    @property
+    def message_count(self) -> int:
+        """Messages taken, without those lost."""
+        return sum(self.counts.values())
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages taken of each topic, by name."""
+        return self._ledger.counts(self._file)
+
+    @property
+    def bytes(self) -> int:
+        """Size of the files, without the chunk in the making."""
+        return self._ledger.size + self._file.size
+
+    @property
+    def start(self) -> int:
+        """Least log time on the disk [ns]; 0 without messages."""
+        return min((f.start for f in self._ledger.infos(self._file) if f.message_count), default=0)
+
+    @property
+    def end(self) -> int:
+        """Greatest log time on the disk [ns]; 0 without messages."""
+        return max((f.end for f in self._ledger.infos(self._file) if f.message_count), default=0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.close()
+        except BagError:
+            if error is None:  # else the first error says more
+                raise
+
+    def _set(self, topic_id: int, topic: Topic) -> None:
+        self._writable[topic_id] = self._ledger.set(topic_id, topic)
+        self._stale = True
+
+    def _refuse_when_over(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+        if self._closed:
+            raise BagError(f'{self.folder}: the bag is closed')
+
+    def _turn(self, log_time: int) -> None:
+        """Begin another file where this one is full; note when it will be."""
+        if self._file.message_count + self._file.pending_messages:
+            self.split()
+        self._turn_at = log_time + self._max_duration
+
+    def _end_chunk(self) -> None:
+        try:
+            self._hold_reserve()
+            self._file.end_chunk()
+        except OSError as error:
+            raise self._failed(error) from None
+        if self._file.size >= self._max_size:
+            self._turn_at = 0.0
+        if time.monotonic() >= self._due:
+            self.flush()
+
+    def _flush(self) -> None:
+        self._due = time.monotonic() + self._period
+        self._hold_reserve()
+        self._file.end_chunk()
+        if self._file.size > self._synced:
+            self._file.sync()
+            self._synced = self._file.size
+            self.flushed = self._ledger.message_count(self._file)
+            self._stale = True
+        if self._file.size >= self._max_size:
+            self._turn_at = 0.0
+        if self._stale:
+            disk.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))
+            self._stale = False
+
+    def _hold_reserve(self) -> None:
+        closing = self._file.closing_size(self._ledger.definitions_size)
+        needed = _MARGIN + closing + 3 * self._ledger.text_size
+        if needed > self._reserve.size:
+            try:
+                self._reserve.hold(2 * needed)
+            except OSError:
+                self._reserve.hold(needed)
+
+    def _failed(self, error: OSError) -> BagError:
+        """Take no more messages; return the error that says why."""
+        self.lost += self._file.drop_chunk()
+        self._writable = {}
+        why = self._reason(error)
+        self._failure = WriteError(
+            f'{self._file.path}: cannot be written ({why}); '
+            f'{self.message_count} messages are kept, {self.lost} are lost',
+            why,
+        )
+        return self._failure
+
+    def _reason(self, error: OSError) -> str:
+        return disk.reason(error) if self.folder.is_dir() else 'the folder has been removed'
+
+    def _open_file(self) -> None:
+        number = len(self._ledger.files) + (self._file is not None)
+        name = f'{self.folder.name}_{number}.mcap'
+        file = McapFile(self.folder / name, self._compression)
+        if self._file is not None:
+            self._ledger.fold(self._file)
+            self._file.close()
+        self._file = file
+        self._turn_at = 0.0
+        self._synced = 0
+        file.add_metadata(metadata.RECORD, {metadata.KEY: self._ledger.text(self._file)})
+        disk.sync_folder(self.folder)
+        self._stale = True
+
+    def _finish_file(self) -> None:
+        if self._file.finished:
+            return
+        self._file.add_metadata(metadata.RECORD, {metadata.KEY: self._ledger.text(self._file)})
+        self._file.finish(list(self._ledger.definitions.values()))
+        self._file.sync()
+
+    def _end_in_reserve(self) -> None:
+        self._reserve.release()
+        self._finish_file()
+        disk.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))

@@ -1,0 +1,245 @@
+"""Bags of others, bags in pieces, and what is no bag at all."""
+
+from bags.making import (
+    ODOMETRIES,
+    ODOMETRY,
+    START,
+    STEP,
+    STRING,
+    TYPES,
+    everything,
+    text,
+    topic,
+    write_bag,
+)
+from mcap.writer import CompressionType, IndexType, Writer
+import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+import yaml
+
+from disc_sim_ros.bags import schemas
+from disc_sim_ros.bags.errors import BagError
+from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.bags.repair import repair
+from disc_sim_ros.bags.writer import BagWriter
+
+pytest.importorskip('rclpy')
+
+
+def mcap_file(path, count: int, *, end: bool = True, **options) -> None:
+    """A file by `mcap.Writer`."""
+    with path.open('wb') as file:
+        writer = Writer(file, chunk_size=20_000, **options)
+        writer.start('ros2', 'others')
+        schema = writer.register_schema(ODOMETRY, 'ros2msg', schemas.definition(ODOMETRY).encode())
+        channel = writer.register_channel('/odom', 'cdr', schema)
+        for n in range(count):
+            writer.add_message(channel, START + n, ODOMETRIES[n % 500], START, sequence=n)
+        if end:
+            writer.finish()
+        else:
+            writer.flush()
+
+
+def test_messages_come_decoded_in_the_order_of_log_times_across_files(tmp_path):
+    with BagWriter(tmp_path / 'bag') as bag:
+        odom, log = bag.add(topic('/odom', ODOMETRY)), bag.add(topic('/log', STRING))
+        for n in (3, 1, 7):
+            bag.write(odom, ODOMETRIES[n], START + n, START)
+        bag.split()
+        for n in (2, 9, 1):
+            bag.write(log, text(f'm{n}'), START + n, START)
+        bag.flush()
+        bag.write(odom, ODOMETRIES[0], START, START)
+    found = open_bag(tmp_path / 'bag')
+    assert (found.start, found.end) == (START, START + 9)
+    got = [
+        (
+            m.topic,
+            m.log_time - START,
+            m.value.data if m.type == STRING else m.value.pose.pose.position.x,
+        )
+        for m in found.messages()
+    ]
+    assert got == [
+        ('/odom', 0, 0.0),
+        ('/odom', 1, 1.0),
+        ('/log', 1, 'm1'),
+        ('/log', 2, 'm2'),
+        ('/odom', 3, 3.0),
+        ('/odom', 7, 7.0),
+        ('/log', 9, 'm9'),
+    ]
+    assert [m.topic for m in found.raw(['/log'])] == ['/log'] * 3
+    assert [m.topic for m in found.raw('/log')] == ['/log'] * 3
+    assert list(found.raw(['/nothing'])) == []
+    assert {t.name: (t.type, t.message_count) for t in found.topics} == {
+        '/odom': (ODOMETRY, 4),
+        '/log': (STRING, 3),
+    }
+
+
+def test_a_bag_of_rosbags_is_read(tmp_path):
+    with RosbagsWriter(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection('/odom', ODOMETRY, typestore=TYPES)
+        for n in range(50):
+            bag.write(connection, START + n * STEP, ODOMETRIES[n])
+        bag.set_custom_data('a', 'b')
+    found = open_bag(tmp_path / 'bag')
+    assert found.complete
+    assert found.message_count == 50
+    assert found.custom_data == {'a': 'b'}
+    assert [m.value.pose.pose.position.x for m in found.messages()] == list(range(50))
+
+
+@pytest.mark.parametrize(
+    'options',
+    [
+        {},
+        {'compression': CompressionType.LZ4},
+        {'use_chunking': False},  # as `ros2 bag record --storage-preset-profile fastwrite`
+        {'index_types': IndexType.NONE},
+        {'use_statistics': False, 'enable_crcs': False},
+        {'repeat_channels': False, 'repeat_schemas': False},
+    ],
+)
+@pytest.mark.parametrize('end', [True, False])
+def test_a_lone_file_of_others_is_read(tmp_path, options, end):
+    mcap_file(tmp_path / 'x.mcap', 700, end=end, **options)
+    found = open_bag(tmp_path / 'x.mcap')
+    assert found.complete == end
+    assert not found.losses
+    assert found.message_count == 700
+    assert everything(found) == [
+        ('/odom', START + n, START, ODOMETRIES[n % 500]) for n in range(700)
+    ]
+    assert [m.sequence for m in found.raw()] == list(range(700))
+
+
+def test_a_folder_without_metadata_is_read_in_the_order_of_its_numbers(tmp_path):
+    for n in (10, 9, 2):
+        mcap_file(tmp_path / f'bag_{n}.mcap', 3)
+    found = open_bag(tmp_path)
+    assert [p.name for p in found.files] == ['bag_2.mcap', 'bag_9.mcap', 'bag_10.mcap']
+    assert not found.complete  # rosbag2 would want metadata.yaml
+    assert found.message_count == 9
+
+
+def test_a_file_that_metadata_does_not_tell_of_yet_is_read(tmp_path):
+    """The recorder was killed between the new file and its metadata."""
+    bag = write_bag(tmp_path / 'bag', 300, split_at=(200,))
+    path = tmp_path / 'bag/metadata.yaml'
+    root = yaml.safe_load(path.read_text(encoding='utf-8'))
+    told = root['rosbag2_bagfile_information']
+    for key in ('files', 'relative_file_paths'):
+        told[key] = told[key][:1]
+    told['message_count'] = 220
+    path.write_text(yaml.safe_dump(root, sort_keys=False), encoding='utf-8')
+    assert open_bag(tmp_path / 'bag').files == bag.files
+    assert not open_bag(tmp_path / 'bag').complete  # metadata.yaml tells of 220
+    assert open_bag(tmp_path / 'bag').message_count == 330
+
+
+@pytest.mark.parametrize('content', [b'', b'\x89MC', bytes(5000)])
+def test_a_next_file_without_beginning_costs_nothing(tmp_path, content):
+    """The recorder was killed, or the power went, just when it was made."""
+    write_bag(tmp_path / 'bag', 100)
+    (tmp_path / 'bag/bag_1.mcap').write_bytes(content)
+    found = open_bag(tmp_path / 'bag')
+    assert len(everything(found)) == found.message_count == 110
+    assert not found.complete
+    report = repair(tmp_path / 'bag', tmp_path / 'made')
+    assert report.message_count == 110
+    assert report.bytes_lost == len(content)
+    assert open_bag(tmp_path / 'made').complete
+
+
+def test_torn_metadata_is_taken_for_none(tmp_path):
+    write_bag(tmp_path / 'bag', 100, custom_data={'a': 'b'})
+    whole = (tmp_path / 'bag/metadata.yaml').read_bytes()
+    for size in range(0, len(whole), 97):
+        (tmp_path / 'bag/metadata.yaml').write_bytes(whole[:size])
+        found = open_bag(tmp_path / 'bag')
+        assert found.message_count == 110
+        assert found.custom_data == {'a': 'b'} or size > len(whole) - 60
+
+
+def edited(tmp_path, **changes) -> None:
+    write_bag(tmp_path / 'bag', 10)
+    path = tmp_path / 'bag/metadata.yaml'
+    root = yaml.safe_load(path.read_text(encoding='utf-8'))
+    root['rosbag2_bagfile_information'].update(changes)
+    path.write_text(yaml.safe_dump(root, sort_keys=False), encoding='utf-8')
+
+
+@pytest.mark.parametrize(
+    ('changes', 'says'),
+    [
+        ({'storage_identifier': 'sqlite3'}, 'sqlite3.*ros2 bag convert'),
+        ({'compression_mode': 'FILE'}, 'compression mode file.*ros2 bag convert'),
+        ({'compression_mode': 'message'}, 'compression mode message.*ros2 bag convert'),
+        ({'relative_file_paths': ['no_0.mcap']}, 'no_0.mcap: the file is missing'),
+    ],
+)
+def test_bags_of_another_kind_are_named(tmp_path, changes, says):
+    edited(tmp_path, **changes)
+    with pytest.raises(BagError, match=says) as caught:
+        open_bag(tmp_path / 'bag')
+    assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'says'),
+    [
+        ('a.mcap', b'', 'is empty'),
+        ('a.mcap', b'\x00' * 100_000, 'no MCAP file'),
+        ('a.mcap', b'hello', 'no MCAP file'),
+        ('a.db3', b'SQLite format 3\0' * 9, 'sqlite3 bag.*ros2 bag convert'),
+        ('a.mcap.zstd', b'\x28\xb5\x2f\xfd' * 9, 'compressed.*zstd -d'),
+        ('a.bag', b'#ROSBAG V2.0\n', 'ROS 1'),
+    ],
+)
+def test_what_is_no_bag_is_named(tmp_path, name, content, says):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(BagError, match=says) as caught:
+        open_bag(tmp_path / name)
+    assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('names', 'says'),
+    [
+        ([], 'no .mcap file'),
+        (['a_0.db3'], 'sqlite3'),
+        (['a_0.mcap.zstd'], 'compressed'),
+    ],
+)
+def test_a_folder_that_is_no_bag_is_named(tmp_path, names, says):
+    for name in names:
+        (tmp_path / name).touch()
+    with pytest.raises(BagError, match=says):
+        open_bag(tmp_path)
+
+
+def test_what_is_not_there_is_named(tmp_path):
+    with pytest.raises(BagError, match='there is no such bag'):
+        open_bag(tmp_path / 'bag')
+
+
+def test_messages_that_cannot_be_decoded_are_named(tmp_path):
+    with (tmp_path / 'a.mcap').open('wb') as file:
+        writer = Writer(file)
+        writer.start('ros2', 'others')
+        json_schema = writer.register_schema('Odd', 'jsonschema', b'{}')
+        writer.add_message(writer.register_channel('/odd', 'json', json_schema), 1, b'{}', 1)
+        string = writer.register_schema(STRING, 'ros2msg', b'string data')
+        writer.add_message(writer.register_channel('/cut', 'cdr', string), 2, b'\0\1\0\0\xff', 2)
+        writer.finish()
+    found = open_bag(tmp_path / 'a.mcap')
+    assert found.message_count == 2
+    assert len(list(found.raw())) == 2
+    with pytest.raises(BagError, match="/odd: messages in 'json'"):
+        list(found.messages(['/odd']))
+    with pytest.raises(BagError, match='/cut at 2 ns is no std_msgs/msg/String'):
+        list(found.messages(['/cut']))
