@@ -69,6 +69,13 @@ def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:
     cphi, sphi = cos_sin_degrees(phi / 2)
     cthe, sthe = cos_sin_degrees(theta / 2)
     cpsi, spsi = cos_sin_degrees(psi / 2)
+    return quaternion_of_half_angles(cphi, sphi, cthe, sthe, cpsi, spsi)
+
+
+def quaternion_of_half_angles(
+    cphi: float, sphi: float, cthe: float, sthe: float, cpsi: float, spsi: float
+) -> Quaternion:
+    """Return `quaternion_from_euler` from cosine and sine of the halves of its angles."""
     return (
         cphi * cthe * cpsi + sphi * sthe * spsi,
         sphi * cthe * cpsi - cphi * sthe * spsi,
@@ -112,8 +119,13 @@ def rotation_matrix(e: ArrayLike) -> FloatArray:
 
 def earth_from_body(e: Quaternion, uvw: Vector) -> Vector:
     """Return the earth components of a vector given in body axes, for one unit quaternion."""
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation_elements(*e)
-    u, v, w = uvw
+    return rotated(rotation_elements(*e), uvw)
+
+
+def rotated(elements: tuple[float, ...], vector: Vector) -> Vector:
+    """Return the product of a matrix, given by its elements row by row, and a vector."""
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = elements
+    u, v, w = vector
     return xx * u + xy * v + xz * w, yx * u + yy * v + yz * w, zx * u + zy * v + zz * w
 
 

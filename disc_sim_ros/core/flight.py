@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 import math
+from typing import Any
 
 import numpy as np
 
@@ -102,13 +103,9 @@ class Setup:
         """
         if self.model == 'precession':  # p and q follow the moments at once
             return
-        disc = self.disc
         V = speed + math.hypot(*self.wind.mean)
-        nutation = abs(spin) * disc.inertia_axial / disc.inertia_diametral
-        rhoVSc_I = self.air.density * V * disc.area * disc.diameter / disc.inertia_diametral
-        damping = 0.25 * rhoVSc_I * disc.diameter * max(-disc.C_Lp, -disc.C_Mq)
-        pitching = math.sqrt(0.5 * rhoVSc_I * V * disc.steepest_moment(self.aero or disc.aero))
-        fastest = max(nutation, damping, pitching)
+        steepest = self.disc.steepest_moment(self.aero or self.disc.aero)
+        fastest = max(rates(spin, V, self.plant, steepest))
         if self.step * fastest > STABLE:
             allowed = (
                 f'at spin {spin:g} rad/s and {V:g} m/s through the air RK4 needs at most '
@@ -134,6 +131,22 @@ class Setup:
         rows = math.ceil(duration / GUST_INTERVAL) + 3
         generator = np.random.Generator(np.random.Philox(int(self.wind.seed)))
         return generator.standard_normal((rows, NOISE_COLUMNS))
+
+
+def rates(spin: Any, V: Any, plant: Plant, steepest: float) -> tuple[Any, Any, Any]:
+    """Return the rates of nutation, damping and pitching of a disc [1/s], for floats or arrays.
+
+    Args:
+        spin: Spin rate [rad/s].
+        V: Airspeed [m/s].
+        plant: Constants of the flight; any of them may be arrays as well.
+        steepest: Largest slope of C_M over the angle of attack, positive [1/rad].
+    """
+    nutation = abs(spin) * plant.I_z / plant.I_x
+    rhoVSc_I = plant.rho * V * plant.S * plant.c / plant.I_x
+    damping = 0.25 * rhoVSc_I * plant.c * max(-plant.C_Lp, -plant.C_Mq)
+    pitching = (0.5 * rhoVSc_I * V * steepest) ** 0.5
+    return nutation, damping, pitching
 
 
 @dataclass(frozen=True, slots=True)
