@@ -16,9 +16,10 @@ from launch.actions import (
     TimerAction,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch_ros.actions import Node
 
 ARGUMENTS = {
-    'bag': ('', 'Folder of the bag, which must not exist; empty: rosbag2_ and the time, here.'),
+    'bag': ('', 'Folder of the bag, which must not exist; empty: bags/disc_ and the time, here.'),
     'throw_after': (
         '3.0',
         'Wait this long before the throw, so that the recorder has found all topics. Unit: s. '
@@ -40,12 +41,15 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([*own, simulator, OpaqueFunction(function=record_and_throw)])
 
 
-def record_and_throw(context: LaunchContext) -> list[ExecuteProcess | TimerAction]:
+def record_and_throw(context: LaunchContext) -> list[Node | TimerAction]:
     """Return the recorder and, later, the call that throws."""
     arguments = context.launch_configurations
-    folder = ['--output', arguments['bag']] if arguments['bag'] else []
-    recorder = ExecuteProcess(
-        cmd=['ros2', 'bag', 'record', '--storage', 'mcap', '--all', *folder], output='screen'
+    recorder = Node(
+        package='disc_sim_ros',
+        executable='recorder_node',
+        namespace=arguments['namespace'],
+        parameters=[{'bag': arguments['bag']}],
+        output='screen',
     )
     wait = float(arguments['throw_after'])
     if wait < 0.0:

@@ -49,7 +49,7 @@ class Topic:
 
     name: str
     type: type
-    subscription: Subscription
+    subscription: Subscription | None
     read: Callable[[Any], Any]
     waiting: list[tuple[int, int, Any]] = field(default_factory=list)  # from when [ns], order
     accepted: int = 0
@@ -65,15 +65,17 @@ class Topic:
 class Commands:
     """The command topics of one node. Only the simulation thread uses it."""
 
-    def __init__(self, node: Node, frames: topics.Frames) -> None:
-        """Subscribe to every command topic."""
+    def __init__(self, node: Node | None, frames: topics.Frames) -> None:
+        """Subscribe to every command topic; without a node nobody commands."""
         self._order = itertools.count()
         group = Polled()
 
         def topic(name: str, kind: type, read: Callable[[Any], Any]) -> Topic:
-            subscription = node.create_subscription(
-                kind, name, _never, topics.COMMAND_QOS, callback_group=group
-            )
+            subscription = None
+            if node is not None:
+                subscription = node.create_subscription(
+                    kind, name, _never, topics.COMMAND_QOS, callback_group=group
+                )
             return Topic(name, kind, subscription, read)
 
         self.moment = topic(
@@ -106,6 +108,8 @@ class Commands:
             refused: Told of every topic that has refused a command.
         """
         for topic in self.all:
+            if topic.subscription is None:
+                continue
             for _ in range(MOST_A_POLL):
                 taken = topic.subscription.handle.take_message(topic.type, False)  # noqa: FBT003
                 if taken is None:

@@ -1,33 +1,23 @@
 """What the simulator publishes: message templates filled once, and who listens."""
 
 from collections.abc import Mapping, Sequence
-import math
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from geometry_msgs.msg import (
-    Point,
-    PoseStamped,
-    TransformStamped,
-    Vector3Stamped,
-    WrenchStamped,
-)
+from geometry_msgs.msg import PoseStamped, TransformStamped, Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry, Path
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import ColorRGBA, Float64, String
-from visualization_msgs.msg import Marker, MarkerArray
+from std_msgs.msg import Float64, String
+from visualization_msgs.msg import MarkerArray
 
 from disc_sim_ros.core import axes
 from disc_sim_ros.core.equations import State
 from disc_sim_ros.nodes import conversions, topics
+from disc_sim_ros.nodes.channels import Channel, Medium
 from disc_sim_ros.nodes.conversions import Quantities, Six, stamp
+from disc_sim_ros.nodes.markers import disc_bytes, field_bytes, field_markers
 from disc_sim_ros.nodes.wire import Wire
 
 try:  # not among the wheels on PyPI
@@ -36,62 +26,24 @@ except ImportError:
     TFMessage = None
 
 LONGEST_PATH = 2000  # points; the oldest go first
-SECTORS = 24
-RIM_HEIGHT = 0.12  # of the diameter
-_BLUE = ColorRGBA(r=0.0, g=0.447, b=0.698, a=1.0)
-_WHITE = ColorRGBA(r=0.95, g=0.95, b=0.95, a=1.0)
-_ORANGE = ColorRGBA(r=0.835, g=0.369, b=0.0, a=1.0)
-
-
-class Channel:
-    """One topic and whether anybody listens, which costs nothing to ask.
-
-    Attributes:
-        heard: Whether the topic has a subscriber.
-    """
-
-    def __init__(
-        self, node: Node, kind: type, name: str, qos: QoSProfile, wire: Wire | None = None
-    ) -> None:
-        self.heard = False
-        self.publisher: Publisher = node.create_publisher(
-            kind,
-            name,
-            qos,
-            event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-        )
-        self._pack = wire.pack if wire is not None else None
-        self._publish = self.publisher.publish
-
-    def send(self, seconds: int, nanoseconds: int, *values: float) -> None:
-        """Publish the patched template."""
-        self._publish(self._pack(seconds, nanoseconds, *values))  # type: ignore[misc]
-
-    def publish(self, message: Any) -> None:
-        """Publish a message that was built whole."""
-        self._publish(message)
-
-    def _on_matched(self, status: Any) -> None:
-        self.heard = status.current_count > 0
 
 
 class Outputs:
     """All topics of one simulator."""
 
     def __init__(  # noqa: PLR0915 - a list of topics
-        self, node: Node, frames: topics.Frames, *, with_clock: bool
+        self, medium: Medium, frames: topics.Frames, *, with_clock: bool
     ) -> None:
-        """Create the publishers and fill the templates."""
+        """Open a channel for each topic and fill the templates."""
         self.frames = frames
-        self._name = node.get_fully_qualified_name()[1:]
+        self._name = medium.name
         self._frame_of = {kind: name for name, kind in conversions.moment_axes(frames).items()}
         map_, disc, body = frames.map, frames.disc, frames.disc_body
 
         def channel(name: str, message: Any, floats: tuple[str, ...] = (), **more: Any) -> Channel:
             qos = more.pop('qos', topics.STATE_QOS)
             wire = Wire(message, floats, **more) if floats or more else None
-            return Channel(node, type(message), name, qos, wire)
+            return medium.channel(type(message), name, qos, wire)
 
         odometry = Odometry(child_frame_id=disc)
         odometry.header.frame_id = map_
@@ -125,15 +77,18 @@ class Outputs:
         if with_clock:
             self.clock = channel(topics.CLOCK, Clock(), stamps=('clock',), qos=topics.CLOCK_QOS)
         self._next_tick = 0.0  # by the steady clock [s]
-        self.path = Channel(node, Path, topics.PATH, topics.STATE_QOS)
+        self.path = medium.channel(Path, topics.PATH, topics.STATE_QOS)
         self._path = Path()
         self._path.header.frame_id = map_
-        self.markers = Channel(node, MarkerArray, topics.MARKERS, topics.LATCHED_QOS)
-        self.events = Channel(node, DiagnosticStatus, topics.FLIGHT_EVENTS, topics.STATE_QOS)
-        self.configuration = Channel(node, String, topics.CONFIGURATION, topics.LATCHED_QOS)
-        self.release = Channel(node, Odometry, topics.RELEASE, topics.LATCHED_QOS)
+        self.markers = medium.channel(MarkerArray, topics.MARKERS, topics.LATCHED_QOS)
+        self.field_markers = medium.channel(MarkerArray, topics.FIELD_MARKERS, topics.LATCHED_QOS)
+        self.events = medium.channel(DiagnosticStatus, topics.FLIGHT_EVENTS, topics.STATE_QOS)
+        self.configuration = medium.channel(String, topics.CONFIGURATION, topics.LATCHED_QOS)
+        self.release = medium.channel(Odometry, topics.RELEASE, topics.LATCHED_QOS)
         self._release = Wire(odometry, conversions.ODOMETRY_FIELDS)
-        self.applied_moment = Channel(node, WrenchStamped, topics.APPLIED_MOMENT, topics.STATE_QOS)
+        self.applied_moment = medium.channel(
+            WrenchStamped, topics.APPLIED_MOMENT, topics.STATE_QOS
+        )
         coefficients = Vector3Stamped()
         coefficients.header.frame_id = frames.disc_air
         self.applied_coefficients = channel(
@@ -218,7 +173,17 @@ class Outputs:
         values = conversions.odometry(s)
         self.release.publish(self._release.pack(*stamp(nanoseconds), *values))
         self.configuration.publish(String(data=configuration))
-        self.markers.publish(_disc_markers(self.frames.disc_body, diameter))
+        self.look(s, diameter)
+
+    def look(self, s: State, diameter: float) -> None:
+        """Publish the disc [m] to look at, and the field it will be thrown over from there."""
+        self.markers.publish(disc_bytes(self.frames.disc_body, diameter))
+        self.field_markers.publish(field_bytes(self.frames, diameter, conversions.pose(s)[:3]))
+
+    def landed(self, release: State, touch: State, diameter: float, text: str) -> None:
+        """Publish the field with the landing and a text above it."""
+        start, end = (conversions.pose(s)[:3] for s in (release, touch))
+        self.field_markers.publish(field_markers(self.frames, diameter, start, end, text))
 
     def event(
         self, name: str, text: str, values: Mapping[str, object], *, bad: bool = False
@@ -263,25 +228,3 @@ def _imu_template(frame: str) -> Imu:
     message.header.frame_id = frame
     message.orientation_covariance[0] = -1.0
     return message
-
-
-def _disc_markers(frame: str, diameter: float) -> MarkerArray:
-    """Return the disc as coloured sectors with a rim, so that its spin can be seen."""
-    r, h = 0.5 * diameter, 0.5 * RIM_HEIGHT * diameter
-    marker = Marker(type=Marker.TRIANGLE_LIST, action=Marker.ADD, ns='disc', frame_locked=True)
-    marker.header.frame_id = frame
-    marker.pose.orientation.w = 1.0
-    marker.scale.x = marker.scale.y = marker.scale.z = 1.0
-    marker.color.a = 1.0
-    for i in range(SECTORS):
-        a, b = (2 * math.pi * j / SECTORS for j in (i, i + 1))
-        colour = _ORANGE if i == 0 else (_BLUE, _WHITE)[i * 4 // SECTORS % 2]
-        top = [Point(x=0.0, y=0.0, z=h)]
-        top += [Point(x=r * math.cos(t), y=r * math.sin(t), z=h) for t in (a, b)]
-        low = [Point(x=p.x, y=p.y, z=-h) for p in top[1:]]
-        under = [top[0], top[2], top[1]]  # seen from below, which is hollow
-        rim = [low[0], low[1], top[2], low[0], top[2], top[1]]
-        for triangle in (top, under, rim):
-            marker.points += triangle
-            marker.colors += [colour] * len(triangle)
-    return MarkerArray(markers=[marker])

@@ -1,6 +1,7 @@
-"""The pages made of the parameter table: docs/parameters.md and config/sim.yaml.
+"""The pages made of the parameter tables.
 
-`python -m disc_sim_ros.nodes.parameter_pages` prints the first, with the word `yaml` the second.
+`python -m disc_sim_ros.nodes.parameter_pages` prints docs/parameters.md; with the word `yaml`
+config/sim.yaml, with `recorder` docs/recorder.md, with `recorder_yaml` config/recorder.yaml.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,6 +12,7 @@ import yaml
 
 from disc_sim_ros.core import check
 from disc_sim_ros.nodes.parameter_table import GROUPS, Entry, Value, allowed_text, plain
+from disc_sim_ros.nodes.recorder_config import RECORDER_GROUPS
 
 _PAGE = """\
 # Parameters of sim_node
@@ -37,9 +39,57 @@ in the air. A fixed one is read-only.
 """
 
 
+_RECORDER_PAGE = """\
+# recorder_node
+
+<!-- Made by: python -m disc_sim_ros.nodes.parameter_pages recorder > docs/recorder.md -->
+
+Records every topic, as the bytes that arrived, into an MCAP bag that `ros2 bag`, Foxglove and
+`analyse_bag` read ([bags.md](bags.md) says what is in it):
+
+    ros2 run disc_sim_ros recorder_node --ros-args -p bag:=my_flight
+    ros2 run disc_sim_ros recorder_node --ros-args -p exclude:='/rosout|/parameter_events'
+
+Ctrl-C or SIGTERM ends it: what has arrived is written, the bag gets its index, and the last line
+says what is in it. Whatever else ends it (SIGKILL, power) costs at most the messages since the
+last flush, `flush_period`; `repair_bag` makes such a bag whole. A full disk or a folder that is
+removed ends it with exit code 1 and a bag that can be read. An existing bag is never touched: exit
+code 2.
+
+- **Found** within 0.05 s of the graph knowing it, whatever publishes it, before or after the
+  start.
+- **Asked for** as reliably as all publishers of a topic offer; if one comes that offers less, a
+  second subscription takes over, and nothing is recorded twice or left out.
+- **Stamped** with the time of arrival as log time (of `/clock` with `use_sim_time`; what comes
+  before the first `/clock` gets that time) and the time of sending as publish time.
+- **Counted**: messages that the middleware lost, numbers missing in the sequence of a publisher,
+  and messages dropped because 512 MiB waited for the disk stand in `/diagnostics`, in the log and
+  in `custom_data` of the bag, as `lost`, `gaps` and `dropped` with the topic.
+
+| service (std_srvs/Trigger) | does |
+|---|---|
+| `~/pause` | record nothing until `~/resume` |
+| `~/resume` | go on, with the last message of each latched topic that came meanwhile |
+| `~/split` | begin the next file of the bag |
+| `~/flush` | bring everything to the disk now |
+
+Parameters are fixed when the node starts; `config/recorder.yaml` holds them all. A misspelt name
+ends the node with an error.
+"""
+
+
 def markdown() -> str:
     """Return docs/parameters.md."""
-    return _PAGE + ''.join(_markdown_group(title, group) for title, group in GROUPS.items())
+    return _PAGE + _markdown_groups(GROUPS)
+
+
+def recorder_markdown() -> str:
+    """Return docs/recorder.md."""
+    return _RECORDER_PAGE + _markdown_groups(RECORDER_GROUPS)
+
+
+def _markdown_groups(groups: Mapping[str, Sequence[Entry]]) -> str:
+    return ''.join(_markdown_group(title, group) for title, group in groups.items())
 
 
 def _markdown_group(title: str, group: Iterable[Entry]) -> str:
@@ -64,13 +114,22 @@ def _markdown_row(entry: Entry) -> str:
 
 def yaml_file() -> str:
     """Return config/sim.yaml: every parameter with its default."""
+    return _yaml_file('sim_node', GROUPS)
+
+
+def recorder_yaml_file() -> str:
+    """Return config/recorder.yaml."""
+    return _yaml_file('recorder_node', RECORDER_GROUPS)
+
+
+def _yaml_file(node: str, groups: Mapping[str, Sequence[Entry]]) -> str:
     lines = [
-        '# Every parameter of sim_node with its default. Copy it and keep what you change.',
+        f'# Every parameter of {node} with its default. Copy it and keep what you change.',
         '# In brackets: what is allowed, and when a change while the node runs takes effect.',
         '/**:',
         '  ros__parameters:',
     ]
-    for title, group in GROUPS.items():
+    for title, group in groups.items():
         lines += ['', f'    # ---- {title} ----']
         parent = ''
         for entry in group:
@@ -96,11 +155,18 @@ def _yaml_value(value: Value) -> str:
     return text.removesuffix('\n').removesuffix('\n...')
 
 
+PAGES: Mapping[str, Callable[[], str]] = {
+    'markdown': markdown,
+    'yaml': yaml_file,
+    'recorder': recorder_markdown,
+    'recorder_yaml': recorder_yaml_file,
+}
+
+
 def main(arguments: Sequence[str]) -> None:
-    """Print docs/parameters.md, or with `yaml` config/sim.yaml."""
-    pages: Mapping[str, Callable[[], str]] = {'markdown': markdown, 'yaml': yaml_file}
-    page = check.choice('page', arguments[0] if arguments else 'markdown', pages)
-    sys.stdout.write(pages[page]())
+    """Print one of the PAGES; without a word the first."""
+    page = check.choice('page', arguments[0] if arguments else 'markdown', PAGES)
+    sys.stdout.write(PAGES[page]())
 
 
 if __name__ == '__main__':

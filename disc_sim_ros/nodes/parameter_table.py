@@ -33,6 +33,7 @@ class Entry:
         highest: Greatest allowed number.
         choices: Allowed words; any text where empty.
         constraint: What else is asked for, a part of a sentence.
+        listed: Whether a text holds words with spaces between; a list of texts will do, too.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Entry:
     highest: float = math.inf
     choices: Sequence[str] = ()
     constraint: str = ''
+    listed: bool = False
 
 
 def _launch() -> Iterator[Entry]:

@@ -144,6 +144,8 @@ def _whole_number(entry: Entry, value: object) -> int:
 
 
 def _text(entry: Entry, value: object) -> str:
+    if entry.listed and isinstance(value, list | tuple) and all(isinstance(x, str) for x in value):
+        value = ' '.join(value)
     if not isinstance(value, str):
         raise ConfigError(entry.name, value, 'give a text')
     if entry.choices and value not in entry.choices:

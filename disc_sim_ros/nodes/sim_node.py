@@ -1,35 +1,31 @@
 """`sim_node`: the disc in real time on ROS 2."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import os
-import re
-import signal
 import sys
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
-import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.logging_severity import LoggingSeverity
-from rclpy.logging import set_logger_level
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import ok, remove_ros_args, try_shutdown
+from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import SetBool, Trigger
 
 from disc_sim_ros.core import simulator
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.core.errors import DiscSimError
 from disc_sim_ros.nodes import parameters, topics
+from disc_sim_ros.nodes.channels import NodeMedium
 from disc_sim_ros.nodes.commands import Commands
 from disc_sim_ros.nodes.outputs import Outputs
+from disc_sim_ros.nodes.program import init, on_signal, plainly
 from disc_sim_ros.nodes.sim_config import SimConfig, configuration
 from disc_sim_ros.nodes.sim_loop import SimLoop
 from disc_sim_ros.nodes.timeline import NANOSECONDS
@@ -53,7 +49,7 @@ class SimNode(Node):
         config = configuration(parameters.values(self))
         frames = topics.Frames.prefixed(config.frame_prefix)
         self._disc = frames.disc
-        outputs = Outputs(self, frames, with_clock=config.publish_clock)
+        outputs = Outputs(NodeMedium(self), frames, with_clock=config.publish_clock)
         commands = Commands(self, frames)
         self._silent_until: dict[str, float] = {}  # by what it is about
         self.loop = SimLoop(config, outputs, commands, first_stamp(config, self), self._warn)
@@ -218,37 +214,6 @@ def main(args: Sequence[str] | None = None) -> int:
         node.destroy_node()
         try_shutdown()
     return 1 if broken else 0
-
-
-def on_signal(handler: Callable[..., object]) -> None:
-    """Have Ctrl-C and SIGTERM handled from now on."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, handler)
-
-
-def init(args: list[str]) -> None:
-    """Initialise ROS with the arguments of a program, its name first.
-
-    Raises:
-        ConfigError: An argument that is not for ROS.
-        RuntimeError: ROS does not understand an argument.
-    """
-    set_logger_level('rcl', LoggingSeverity.FATAL)  # it would tell a part of the error, too
-    other = remove_ros_args(args)[1:]
-    if other:
-        raise ConfigError(
-            'arguments', ' '.join(other), 'parameters are -p NAME:=VALUE after --ros-args'
-        )
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    set_logger_level('rcl', LoggingSeverity.UNSET)
-
-
-def plainly(error: Exception) -> str:
-    """Return an error as one line, without where in the sources of ROS it was found."""
-    text = ' '.join(re.sub(r', at /[^\s,]+', '', str(error)).split())
-    if type(error).__name__ == 'UnknownROSArgsError':
-        return f'unknown arguments after --ros-args: {text}'
-    return re.sub('^(failed to initialize rcl|Failed to parse ROS arguments): ', '', text)
 
 
 if __name__ == '__main__':

@@ -29,7 +29,11 @@ class Timeline:
     @property
     def now(self) -> int:
         """Return the present stamp [ns]."""
-        return self._start + self.steps * self._num // self._den
+        return self.at(self.steps)
+
+    def at(self, step: int) -> int:
+        """Return the stamp of a step since the last `restart` [ns]."""
+        return self._start + step * self._num // self._den
 
     def step_at(self, stamp: int) -> int:
         """Return the first step not before a stamp [ns], or the present one."""

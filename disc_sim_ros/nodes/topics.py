@@ -24,6 +24,7 @@ SPIN_RATE = 'spin_rate'
 AERO_WRENCH = 'aero_wrench'
 PATH = 'path'
 MARKERS = 'markers'  # LATCHED_QOS
+FIELD_MARKERS = 'field_markers'  # LATCHED_QOS
 FLIGHT_EVENTS = 'flight_events'
 CONFIGURATION = 'configuration'  # LATCHED_QOS
 RELEASE = 'release'  # LATCHED_QOS

@@ -58,6 +58,7 @@ def types_of_topics() -> dict[str, str]:
     """The types of all topics, found by making them with a node that only takes note."""
     from diagnostic_msgs.msg import DiagnosticArray
 
+    from disc_sim_ros.nodes.channels import NodeMedium
     from disc_sim_ros.nodes.commands import Commands
 
     class Note:
@@ -77,7 +78,7 @@ def types_of_topics() -> dict[str, str]:
             return '/sim_node'
 
     note = Note()
-    outputs.Outputs(note, Frames(), with_clock=True)
+    outputs.Outputs(NodeMedium(note), Frames(), with_clock=True)
     Commands(note, Frames())
     return note.types
 
@@ -86,7 +87,7 @@ def test_latched_topics_are_called_so():
     latched = set(re.findall(r'topics\.(\w+), topics\.LATCHED_QOS', source('outputs')))
     told = {row[0].strip('`') for row in rows('Published') if 'latched' in row[-1]}
     assert told == {getattr(topics, name) for name in latched}
-    assert len(told) == 3
+    assert len(told) == 4
 
 
 def test_every_service_is_there_and_no_other():
@@ -96,13 +97,13 @@ def test_every_service_is_there_and_no_other():
 
 
 def test_every_event_is_there_and_no_other():
-    assert set(named('Events')) == set(re.findall(r"_event\('([^']+)'", source('sim_loop')))
+    assert set(named('Events')) == set(re.findall(r"_event\('([^']+)'", source('simulation')))
 
 
 def test_every_value_of_an_event_is_there():
     events = re.split('^### Events$', PAGE, flags=re.MULTILINE)[1].partition('\n## ')[0]
     told = set(re.findall(r'`(\w+)`', events))
-    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim_loop'))
+    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('simulation'))
     assert set(made) <= told
 
 
@@ -121,9 +122,11 @@ def test_limits_are_those_of_the_code():
 
 
 def test_numbers_of_the_text_are_those_of_the_code():
-    from disc_sim_ros.nodes import commands, pacer
+    from disc_sim_ros.nodes import commands, markers, pacer
 
     assert f'the last {outputs.LONGEST_PATH}' in PAGE
+    assert f'the disc {markers.ENLARGEMENT:g} times enlarged' in PAGE
+    assert f'lines every {markers.FIELD_SPACING:g} m' in PAGE
     assert f'At most {commands.MOST_WAITING} of a topic' in PAGE
     assert f'up to {pacer.CATCH_UP:g} s of wall time' in PAGE
     assert f'every {topics.CLOCK_PERIOD * 1000:g} ms of wall time' in PAGE

@@ -1,0 +1,291 @@
+"""recorder_node as processes: what was published is in the bag, whatever happens."""
+
+from contextlib import contextmanager
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from nav_msgs.msg import Odometry
+from nodes.recorder_process import Counter, Recorder, counts
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+
+from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.bags.repair import repair
+from disc_sim_ros.nodes import offers, topics
+
+pytestmark = pytest.mark.ros
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+BEST_EFFORT = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.BEST_EFFORT)
+SECOND = 10**9  # ns
+
+
+@pytest.fixture
+def record(ros, tmp_path):
+    """A function that starts a recorder; what still runs at the end is killed."""
+    started = []
+
+    def start(bag=None, **parameters) -> Recorder:
+        folder = bag or tmp_path / f'bag_{len(started)}'
+        started.append(Recorder(ros, folder, parameters))
+        return started[-1]
+
+    yield start
+    for recorder in started:
+        recorder.process.kill()
+        recorder.process.wait()
+
+
+def call(ros, service: str) -> str:
+    client = ros.node.create_client(Trigger, f'recorder_node/{service}')
+    ros.spin_until(client.service_is_ready, service)
+    # A server drops its answer to a client that it has not found yet: ask until there is one.
+    answers = []
+
+    def answered() -> bool:
+        answers.append(client.call_async(Trigger.Request()))
+        end = time.monotonic() + 0.5
+        while not any(a.done() for a in answers) and time.monotonic() < end:
+            ros.spin_until(lambda: True)
+            time.sleep(0.01)
+            ros._executor.spin_once(0.0)
+        return any(a.done() for a in answers)
+
+    ros.spin_until(answered, f'an answer of {service}')
+    answer = next(a for a in answers if a.done()).result()
+    assert answer.success, answer.message
+    return answer.message
+
+
+def test_the_bag_holds_the_bytes_of_a_flight_and_what_the_graph_says(ros, record):
+    recorder = record()
+    ros.start({'auto_throw': False})
+    odometry = ros.listen(Odometry, topics.ODOM, raw=True)
+    configuration = ros.listen(String, topics.CONFIGURATION, raw=True, qos=LATCHED)
+    recorder.listens_to('/odom', '/configuration', '/flight_events', '/release')
+    ros.spin_until(lambda: odometry, 'odometry')
+    sim = ros.sims[0]
+    assert ros.call(sim, 'throw').success
+    ros.spin_until(lambda: configuration, 'the configuration')
+    ros.spin_until(lambda: len(odometry) > 300, 'a second and a half')
+    graph = {
+        name: ros.node.get_publishers_info_by_topic(name) for name in ('/odom', '/configuration')
+    }
+    assert recorder.end() == 0
+    assert 'nothing lost' in recorder.said
+
+    bag = open_bag(recorder.bag)
+    assert bag.complete
+    recorded = [m.data for m in bag.raw(['/odom'])]
+    first = recorded.index(odometry[0])
+    heard = odometry[: len(recorded) - first]
+    assert len(heard) > 300
+    assert recorded[first : first + len(heard)] == heard
+    assert [m.data for m in bag.raw(['/configuration'])] == configuration
+    for info in bag.topics:
+        if info.topic.name in graph:
+            expected = offers.topic_of(info.topic.name, info.topic.type, graph[info.topic.name])
+            assert expected.definition
+            assert expected.type_hash.startswith('RIHS01_')
+            assert info.topic == expected
+    times = [(m.publish_time, m.log_time) for m in bag.raw(['/odom'])]
+    assert all(0 <= log - sent < SECOND for sent, log in times)
+
+
+def test_what_is_latched_and_who_comes_later_are_recorded(ros, record):
+    latched = ros.node.create_publisher(Int64, 'latched', LATCHED)
+    latched.publish(Int64(data=7))
+    recorder = record()
+    recorder.listens_to('/latched')
+    late = Counter(ros, 'late')
+    recorder.listens_to('/late')
+    late.heard_by(1)
+    late.publish(100)
+    ros.spin_until(lambda: '/late' in recorder.said, '')
+    assert recorder.end(signal.SIGTERM) == 0
+    assert counts(recorder.bag, '/latched') == [7]
+    assert counts(recorder.bag, '/late') == list(range(100))
+
+
+def test_a_second_publisher_that_offers_less_is_recorded_without_gap_or_repetition(ros, record):
+    sure = Counter(ros, 'both')
+    recorder = record()
+    recorder.listens_to('/both')
+    sure.heard_by(1)
+    sure.publish(200)
+    unsure = Counter(ros, 'both', BEST_EFFORT)
+    unsure.heard_by(1)
+    for _ in range(1500):  # past the second in which two subscriptions hear
+        sure.publish_one()
+        unsure.publish_one()
+        time.sleep(0.001)
+    assert recorder.end() == 0
+    found = counts(recorder.bag, '/both')
+    expected = sorted([*range(1700), *range(1500)])
+    assert sorted(found) == expected
+    (info,) = (i for i in open_bag(recorder.bag).topics if i.topic.name == '/both')
+    assert {q.reliability for q in info.topic.qos} == {'reliable', 'best_effort'}
+
+
+def test_a_killed_recorder_costs_at_most_the_last_second(ros, record, tmp_path):
+    recorder = record()
+    counter = Counter(ros, 'count')
+    recorder.listens_to('/count')
+    counter.heard_by(1)
+    counter.publish(1600, rate=1000.0)
+    recorder.process.kill()
+    killed = time.monotonic()
+    recorder.wait()
+    found = counts(recorder.bag, '/count')
+    assert found == list(range(len(found)))
+    old = [n for n, sent in enumerate(counter.sent) if sent < killed - 1.0]
+    assert len(found) >= len(old)
+    assert not open_bag(recorder.bag).complete
+    repair(recorder.bag, tmp_path / 'whole')
+    assert open_bag(tmp_path / 'whole').complete
+    assert counts(tmp_path / 'whole', '/count') == found
+
+
+def test_pause_resume_and_split(ros, record):
+    latched = ros.node.create_publisher(Int64, 'latched', LATCHED)
+    counter = Counter(ros, 'count')
+    recorder = record(start_paused=True)
+    recorder.listens_to('/count', '/latched')
+    counter.heard_by(1)
+    latched.publish(Int64(data=1))
+    counter.publish(50)
+    assert 'recording' in call(ros, 'resume')
+    counter.publish(500)
+    assert 'bag_0_1.mcap' in call(ros, 'split')
+    counter.publish(500)
+    assert 'paused' in call(ros, 'pause')
+    counter.publish(50)
+    assert recorder.end() == 0
+    found = counts(recorder.bag, '/count')
+    assert found == list(range(found[0], found[-1] + 1))
+    assert (found[0], found[-1]) == (50, 1049)
+    assert counts(recorder.bag, '/latched') == [1]
+    bag = open_bag(recorder.bag)
+    assert [path.name for path in bag.files] == ['bag_0_0.mcap', 'bag_0_1.mcap']
+    assert sum(len(counts(path, '/count')) for path in bag.files) == 1000
+
+
+def test_stamps_follow_the_time_of_the_simulation(ros, record):
+    counter = Counter(ros, 'count')
+    clock = ros.node.create_publisher(Clock, '/clock', 10)
+    recorder = record(use_sim_time=True)
+    recorder.listens_to('/count')
+    counter.heard_by(1)
+    counter.publish(10)  # before anybody knows the time
+    ros.spin_until(lambda: clock.get_subscription_count() >= 2, 'its clock')  # node and recording
+    tick = Clock()
+    tick.clock.sec = 100
+    clock.publish(tick)
+    end = time.monotonic() + 10.0
+
+    def time_has_come() -> bool:
+        call(ros, 'flush')
+        return len(counts(recorder.bag, '/count')) >= 10
+
+    while not time_has_come():
+        assert time.monotonic() < end
+    counter.publish(10)
+    assert recorder.end() == 0
+    messages = list(open_bag(recorder.bag).raw(['/count']))
+    assert [m.log_time for m in messages] == [100 * SECOND] * 20
+
+
+def test_files_split_by_duration_and_ended_impatiently_hold_everything(ros, record):
+    counter = Counter(ros, 'count')
+    recorder = record(max_duration_s=0.2)
+    recorder.listens_to('/count')
+    counter.heard_by(1)
+    counter.publish(1000, rate=1000.0)
+    recorder.process.send_signal(signal.SIGINT)
+    recorder.process.send_signal(signal.SIGINT)
+    assert recorder.end(signal.SIGTERM) == 0
+    assert 'Traceback' not in recorder.said
+    assert counts(recorder.bag, '/count') == list(range(1000))
+    assert len(open_bag(recorder.bag).files) >= 4
+
+
+def test_two_recorders_of_one_name_go_on_with_a_bag_each(ros, record):
+    counter = Counter(ros, 'count')
+    both = record(), record()
+    for recorder in both:
+        recorder.listens_to('/count')
+    counter.heard_by(2)
+    counter.publish(100)
+    both[0].wait_for('there is another node /recorder_node')
+    for recorder in both:
+        assert recorder.end() == 0
+        assert counts(recorder.bag, '/count') == list(range(100))
+
+
+def test_a_bag_that_exists_is_left_alone(record, tmp_path):
+    (tmp_path / 'mine').mkdir()
+    recorder = record(tmp_path / 'mine')
+    assert recorder.wait() == 2
+    (line,) = recorder.said.splitlines()
+    assert line.startswith('recorder_node: error: ')
+    assert 'exists' in line
+    assert list((tmp_path / 'mine').iterdir()) == []
+
+
+def test_a_misspelt_parameter_is_one_line(record):
+    recorder = record(max_size=3)
+    assert recorder.wait() == 2
+    (line,) = recorder.said.splitlines()
+    assert 'max_size_mib' in line
+    assert not recorder.bag.exists()
+
+
+@contextmanager
+def small_disk(folder, size: str):
+    folder.mkdir()
+    if os.geteuid() != 0:
+        pytest.skip('mounting takes root')
+    mount = ['mount', '-t', 'tmpfs', '-o', f'size={size}', 'tmpfs', str(folder)]
+    if subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip('no file system can be mounted here')
+    try:
+        yield folder
+    finally:
+        subprocess.run(['umount', '-l', str(folder)], check=True)
+
+
+def test_a_full_disk_ends_it_with_a_readable_bag(ros, record, tmp_path):
+    with small_disk(tmp_path / 'disk', '3M') as disk:
+        noise = ros.node.create_publisher(String, 'noise', 1000)
+        recorder = record(disk / 'bag', topics='/noise')
+        recorder.listens_to('/noise')
+        while recorder.process.poll() is None and recorder.process.returncode is None:
+            noise.publish(String(data=os.urandom(3000).hex()))
+            time.sleep(0.002)
+        assert recorder.wait() == 1
+        assert 'No space left' in recorder.said.splitlines()[-1]
+        assert 'Traceback' not in recorder.said
+        bag = open_bag(disk / 'bag')
+        assert bag.complete
+        assert sum(1 for _ in bag.raw()) > 20
+
+
+def test_a_folder_that_is_removed_ends_it_with_a_line(ros, record):
+    counter = Counter(ros, 'count')
+    recorder = record()
+    recorder.listens_to('/count')
+    counter.heard_by(1)
+    shutil.rmtree(recorder.bag)
+    counter.publish(1000, rate=1000.0)
+    assert recorder.wait() == 1
+    assert 'removed' in recorder.said.splitlines()[-1]
+    assert 'Traceback' not in recorder.said

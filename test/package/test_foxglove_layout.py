@@ -1,0 +1,221 @@
+"""The Foxglove layout shows topics that exist, and a flight fits into its views."""
+
+from collections.abc import Iterator
+import json
+import math
+from pathlib import Path
+import re
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from nav_msgs.msg import Path as PathMessage
+from visualization_msgs.msg import MarkerArray
+
+from disc_sim_ros.core import axes
+from disc_sim_ros.core.flight import fly
+from disc_sim_ros.nodes import topics
+from disc_sim_ros.nodes.outputs import Outputs
+from disc_sim_ros.nodes.sim_config import configuration
+from disc_sim_ros.nodes.topics import Frames
+
+ROOT = Path(__file__).parents[2]
+LAYOUT = json.loads((ROOT / 'config/foxglove_layout.json').read_text(encoding='utf-8'))
+PANELS = LAYOUT['configById']
+PAGE = (ROOT / 'docs/foxglove.md').read_text(encoding='utf-8')
+FIELD, CLOSE = PANELS['3D!field'], PANELS['3D!disc']
+WIDEST, NARROWEST = 4.5, 2.6  # width by height of the field, without and with an open side bar
+CLOSE_UP = 0.7  # of the close-up, with an open side bar
+NUMBER = {'double', 'float', 'int32', 'uint32', 'int64'}
+MODIFIERS = {'.@rad2deg': 180.0 / math.pi}
+
+
+# ---- panels ----
+
+
+def leaves(tree: dict | str) -> Iterator[str]:
+    """Yield the panels of a tree of splits."""
+    if isinstance(tree, str):
+        yield tree
+        return
+    assert tree['direction'] in {'row', 'column'}
+    assert 0 < tree['splitPercentage'] < 100
+    assert set(tree) == {'direction', 'first', 'second', 'splitPercentage'}
+    yield from leaves(tree['first'])
+    yield from leaves(tree['second'])
+
+
+def of_kind(kind: str) -> dict[str, dict]:
+    return {name: panel for name, panel in PANELS.items() if name.startswith(f'{kind}!')}
+
+
+def test_every_panel_is_placed_once():
+    placed = list(leaves(LAYOUT['layout']))
+    assert len(placed) == len(set(placed))
+    assert set(placed) == set(PANELS)
+    assert {name.partition('!')[0] for name in placed} == {'3D', 'Plot', 'Gauge'}
+    assert LAYOUT['playbackConfig'] == {'speed': 1}
+    assert LAYOUT['globalVariables'] == LAYOUT['userNodes'] == {}
+
+
+def test_every_panel_has_a_title_that_the_page_explains():
+    for panel in PANELS.values():
+        title, _, _ = panel['foxglovePanelTitle'].partition(' [')
+        assert title.partition(',')[0].lower() in PAGE.lower()
+
+
+def test_colours_are_colours():
+    found = re.findall(r'"(#[^"]*)"', json.dumps(PANELS))
+    assert len(found) > 8
+    assert [c for c in found if not re.fullmatch('#([0-9a-fA-F]{2}){3,4}', c)] == []
+
+
+# ---- topics and fields ----
+
+
+class Kinds:
+    """Topics without a network; keeps their types."""
+
+    name = 'sim_node'
+
+    def __init__(self):
+        self.of = {}
+
+    def channel(self, kind, name, qos, wire=None):
+        self.of[name if name.startswith('/') else f'/{name}'] = kind
+        return type('Channel', (), {'publish': None})()
+
+
+@pytest.fixture(scope='module')
+def kinds() -> dict[str, type]:
+    found = Kinds()
+    Outputs(found, Frames(), with_clock=True)
+    return found.of
+
+
+def paths() -> list[str]:
+    plots = [path['value'] for panel in of_kind('Plot').values() for path in panel['paths']]
+    return plots + [panel['path'] for panel in of_kind('Gauge').values()]
+
+
+def slots(kind: type, names: list[str]) -> str:
+    """Return the type of a field of a field of a message type."""
+    for name in names[:-1]:
+        kind = type(getattr(kind(), name))
+    return kind.get_fields_and_field_types()[names[-1]]
+
+
+def test_plots_and_gauges_show_numbers_of_topics_that_exist(kinds):
+    for path in paths():
+        plain, modifier, _ = path.partition('.@')
+        assert not modifier or path[len(plain) :] in MODIFIERS
+        topic, *names = plain.split('.')
+        assert slots(kinds[topic], names) in NUMBER
+
+
+def test_plots_show_what_a_flight_is_judged_by():
+    shown = {path.partition('.')[0].lstrip('/') for path in paths()}
+    assert shown == {topics.POSE, topics.AIRSPEED, topics.ANGLE_OF_ATTACK, topics.SPIN_RATE}
+
+
+def test_plots_show_the_whole_bag_on_one_time_axis():
+    for plot in of_kind('Plot').values():
+        assert plot['isSynced']
+        assert plot['xAxisVal'] == 'timestamp'
+        assert all(path['enabled'] for path in plot['paths'])
+        assert {path['timestampMethod'] for path in plot['paths']} == {'receiveTime'}
+        assert not {'minXValue', 'maxXValue', 'followingViewWidth'} & set(plot)
+
+
+@pytest.fixture(scope='module')
+def flight():
+    """The flight of Fig. 5, with a sample at each message."""
+    config = configuration({})
+    return fly(config.launch, config.setup, sample_rate=config.publish_rate)
+
+
+def test_gauges_reach_as_far_as_the_flight(flight):
+    seen = flight.trajectory
+    values = {'/airspeed.data': seen.airspeed, '/angle_of_attack.data': seen.alpha}
+    for gauge in of_kind('Gauge').values():
+        found = values[gauge['path']]
+        assert gauge['minValue'] < gauge['maxValue']
+        assert gauge['minValue'] <= found.min()
+        assert found.max() <= gauge['maxValue']
+        assert np.ptp(found) > 0.1 * (gauge['maxValue'] - gauge['minValue'])  # the needle moves
+
+
+# ---- views ----
+
+
+def visible(panel: dict) -> set[str]:
+    return {topic for topic, settings in panel['topics'].items() if settings['visible']}
+
+
+def test_views_draw_what_they_are_for(kinds):
+    assert visible(FIELD) == {f'/{topics.FIELD_MARKERS}', f'/{topics.PATH}'}
+    assert visible(CLOSE) == {f'/{topics.MARKERS}'}
+    for panel in of_kind('3D').values():
+        assert set(panel['topics']) <= set(kinds)
+        assert {kinds[topic] for topic in visible(panel)} <= {MarkerArray, PathMessage}
+        frames = {f'frame:{name}' for name in ('map', 'disc', 'disc_body')}
+        assert set(panel['transforms']) == frames
+
+
+def test_views_follow_frames_that_exist():
+    frames = Frames()
+    assert (FIELD['followTf'], CLOSE['followTf']) == (frames.map, frames.disc)
+    for panel in of_kind('3D').values():
+        assert panel['followMode'] == 'follow-pose'
+        assert {layer['frameId'] for layer in panel['layers'].values()} == {frames.map}
+
+
+def on_screen(panel: dict, points: np.ndarray, aspect: float) -> np.ndarray:
+    """Return points, shape (n, 3), in a view: right and up, shape (n, 2); its edges are at 1.
+
+    The camera of the viewer goes round its target: `phi` down from the zenith, and at a
+    `thetaOffset` of 0 it looks along y.
+    """
+    camera = panel['cameraState']
+    phi, theta = np.radians([camera['phi'], camera['thetaOffset']])
+    right = np.array([math.cos(theta), -math.sin(theta), 0.0])
+    level = np.array([-math.sin(theta), -math.cos(theta), 0.0])
+    back = math.sin(phi) * level + math.cos(phi) * np.array([0.0, 0.0, 1.0])
+    seen = points - (np.array(camera['targetOffset']) + camera['distance'] * back)
+    depth = -seen @ back
+    assert depth.min() > camera['near']
+    assert depth.max() < camera['far']
+    half = depth * math.tan(0.5 * math.radians(camera['fovy']))
+    return np.stack((seen @ right / (half * aspect), seen @ np.cross(back, right) / half), axis=1)
+
+
+@pytest.mark.parametrize('aspect', [WIDEST, NARROWEST])
+def test_the_field_shows_the_flight_from_release_to_landing(flight, aspect):
+    t = flight.trajectory
+    flown = np.vstack((axes.map_from_paper(t.position), flight.position))
+    seen = on_screen(FIELD, flown, aspect)
+    assert np.abs(seen).max() < 0.95
+    assert np.ptp(seen[:, 0]) > 0.8  # over 2: it does not fly in a corner
+    assert (np.diff(seen[:, 0]) > 0).all()  # to the right
+
+
+@pytest.mark.parametrize('aspect', [1.0, CLOSE_UP])
+def test_the_close_up_is_filled_by_the_disc(aspect):
+    turn = np.linspace(0.0, 2 * math.pi, 100)
+    radius = 0.5 * configuration({}).setup.disc.diameter
+    rim = radius * np.stack((np.cos(turn), np.sin(turn), 0.0 * turn), axis=1)
+    seen = on_screen(CLOSE, rim, aspect)
+    assert np.abs(seen).max() < 1.0
+    assert np.ptp(seen[:, 0]) > 1.0  # half the width
+
+
+# ---- page ----
+
+
+def test_the_page_says_how_to_open_it():
+    for word in ('config/foxglove_layout.json', 'Lichtblick', 'Foxglove', 'tools/viewer/open.mjs'):
+        assert word in PAGE
+    assert (ROOT / 'tools/viewer/open.mjs').exists()
+    assert all(f'`{topic[1:]}`' in PAGE for panel in (FIELD, CLOSE) for topic in visible(panel))
