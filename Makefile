@@ -29,9 +29,14 @@ test: setup-test ## setup, then every test, ruff, mypy and the import rules
 lint: setup-test ## the same without the tests
 	@tools/check ruff format mypy imports
 
-fly: setup ## throw the disc of the paper's Fig. 5 (DISC=wraith THROW='--speed 25 --spin 120')
-	@mkdir -p flights
-	@$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW)
+fly: setup ## throw a disc in real time, record and plot it (DISC=wraith THROW='--speed 25 --spin 120')
+	@if $(BIN)/python -c 'import rclpy' 2>/dev/null; then \
+		$(BIN)/demo $(if $(DISC),--disc '$(DISC)') $(THROW); \
+	else \
+		echo 'fly: no ROS 2 in .venv: the throw is computed, without simulator, recorder and bag'; \
+		mkdir -p flights && \
+		$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW); \
+	fi
 
 bench-flights: setup-test ## measure flights per second
 	@$(BIN)/python benchmarks/flights.py

@@ -136,7 +136,7 @@ def summary(flight: Flight) -> str:
         f'  {ended} after {flight.time:.3f} s at x {flight.position[0]:.2f} m, '
         f'y {flight.position[1]:.2f} m, z {flight.position[2]:.2f} m',
         *(['  (on the ground and not climbing: try --height 1)'] if flight.time == 0.0 else []),
-        f'  range   {flight.range:.2f} m, {_sideways(flight.drift)}, apex {flight.apex:.2f} m',
+        f'  range   {flight.range:.2f} m, {sideways(flight.drift)}, apex {flight.apex:.2f} m',
         f'  speed   {math.hypot(*flight.end[3:6]):.2f} m/s at the end'
         + (f', {flight.end.r / launch.spin:.1%} of the spin left' if launch.spin else ''),
     ]
@@ -159,7 +159,8 @@ def samples_text(trajectory: Trajectory) -> str:
     return '\n'.join(lines)
 
 
-def _sideways(drift: float) -> str:
+def sideways(drift: float) -> str:
+    """Return how far left (positive) or right something ended, to read."""
     return f'drift {abs(drift):.2f} m to the {"left" if drift >= 0.0 else "right"}'
 
 

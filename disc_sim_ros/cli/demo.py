@@ -1,0 +1,264 @@
+"""`demo`: throw one disc in real time with the simulator and the recorder, and show the result."""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+import signal
+import sys
+import tempfile
+from typing import TYPE_CHECKING, Self
+
+import disc_sim_ros
+from disc_sim_ros import __version__
+from disc_sim_ros.cli import output, throw_flags
+from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.core import flight
+from disc_sim_ros.core.errors import ConfigError, DiscSimError
+
+if TYPE_CHECKING:
+    from disc_sim_ros.nodes.live import Seen
+
+DIFFERENT = 3  # exit code, as of analyse_bag
+HELD = 3600.0  # s that --control acts without being renewed: the whole flight
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def parser() -> Parser:
+    """Return the command line of `demo`."""
+    p = Parser(
+        prog='demo',
+        description='Start sim_node and recorder_node in a ROS domain of their own, throw one '
+        'disc in real time, and leave a bag, a plot and a summary. Angles and control inputs have '
+        f'the signs of {throw_flags.PAPER}. Needs ROS 2 Jazzy.',
+        epilog='Exit code 0; 1: something failed; 2: bad input; 3: the flight computed again from '
+        'the bag differs from the recorded one.',
+    )
+    p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    throw_flags.add_disc(p)
+    throw_flags.add_launch(p)
+    throw_flags.add_air(p, 'air and controls')
+    kept = p.add_argument_group('what is kept')
+    text = 'longest time to wait for the landing'
+    throw_flags.add_number(kept, '--seconds', 60.0, 0.1, flight.LONGEST, 's', 'S', text)
+    kept.add_argument(
+        '--bag',
+        default=argparse.SUPPRESS,
+        metavar='DIR',
+        help='new folder for the bag; the plot is DIR.png (default: bag and flight.png in '
+        'flights/DATE_TIME)',
+    )
+    return p
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run `demo`; return its exit code."""
+    output.mend_streams()
+    p = parser()
+    chosen = p.parse_args(arguments)
+    try:
+        return _run(chosen)
+    except ConfigError as error:
+        thing = throw_flags.flag_of(error, chosen)
+        p.error(str(ConfigError({'bag': '--bag'}.get(thing, thing), error.value, error.allowed)))
+    except DiscSimError as error:
+        sys.stderr.write(f'demo: error: {error}\n')
+        return 1
+    except KeyboardInterrupt as end:
+        number = end.args[0] if end.args else signal.SIGINT
+        return 128 + int(number)
+
+
+def _run(chosen: argparse.Namespace) -> int:
+    release, setup = throw_flags.thrown(chosen)
+    flight.check_flight(release, setup, chosen.seconds, ground=True, sample_rate=0.0)
+    try:
+        from disc_sim_ros.nodes import live  # noqa: F401, PLC0415 - to see that ROS is there
+        from disc_sim_ros.nodes.sim_config import configuration  # noqa: PLC0415
+    except ImportError as error:
+        raise DiscSimError(
+            f'it needs rclpy and the message packages of ROS 2 Jazzy ({error}); '
+            '`fly --plot FILE.png` throws without them'
+        ) from None
+    parameters = throw_flags.parameters(chosen, release, setup)
+    configuration(parameters)  # what the simulator would refuse is refused here
+    bag, plot = _places(getattr(chosen, 'bag', None))
+    try:
+        with _Signals() as signals:
+            _record(chosen, parameters, bag, signals)
+    finally:
+        with suppress(OSError):
+            bag.parent.rmdir()  # only where nothing was recorded
+    return _report(bag, plot)
+
+
+def _places(bag: str | None) -> tuple[Path, Path]:
+    """Return where the bag and the plot go; neither exists.
+
+    Raises:
+        ConfigError: The bag exists, or its folder cannot be made.
+    """
+    if bag is not None:
+        folder = Path(bag)
+        plot = folder.with_name(f'{folder.name}.png')
+        for path in (folder, plot):
+            if path.exists() or path.is_symlink() or not folder.name:
+                raise ConfigError('--bag', bag, f'{path} exists, and nothing is overwritten')
+        _make(folder.parent, '--bag', bag)
+        return folder, plot
+    name = f'{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
+    for number in range(1, 1000):
+        folder = Path('flights', name if number == 1 else f'{name}_{number}')
+        if not folder.exists():
+            _make(folder, 'flights', str(folder))
+            break
+    return folder / 'bag', folder / 'flight.png'
+
+
+def _make(folder: Path, thing: str, value: str) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(thing, value, f'cannot make the folder ({error.strerror})') from None
+
+
+class _Signals:
+    """Lets Ctrl-C, SIGTERM and the end of the terminal end the block in order, but only once."""
+
+    def __init__(self) -> None:
+        self._holding = False
+        self._came = 0
+
+    def __enter__(self) -> Self:
+        self._before = {number: signal.signal(number, self._take) for number in _SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let signals wait for the end of this block: no process is started and forgotten."""
+        self._holding = True
+        try:
+            yield
+        finally:
+            self._holding = False
+        if self._came:
+            raise KeyboardInterrupt(self._came)
+
+    def _take(self, number: int, _: object) -> None:
+        for other in _SIGNALS:  # the end is on its way
+            signal.signal(other, signal.SIG_IGN)
+        self._came = number
+        if not self._holding:
+            raise KeyboardInterrupt(number)
+
+
+def _record(
+    chosen: argparse.Namespace,
+    parameters: dict[str, bool | float | str],
+    bag: Path,
+    signals: _Signals,
+) -> None:
+    """Fly and record one throw."""
+    from disc_sim_ros.nodes import live  # noqa: PLC0415
+
+    control = throw_flags.control_of(chosen)
+    parameters |= {'auto_throw': False, 'command_timeout': HELD}
+    progress = _Progress()
+    with ExitStack() as stack:
+        domain = stack.enter_context(live.own_domain())
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='demo_')))
+        progress.line(f'starting sim_node and recorder_node in ROS domain {domain}')
+        if not flight.is_ready():
+            progress.line('compiling the equations of motion, once on this machine, about 10 s')
+        with signals.held():
+            sim = stack.enter_context(live.started('sim_node', parameters, folder))
+            to = {'bag': str(bag.absolute()), 'start_paused': True}
+            recorder = stack.enter_context(live.started('recorder_node', to, folder))
+        watcher = live.Watcher(domain, (sim, recorder))
+        stack.callback(watcher.close)
+        watcher.wait_until_recorded(bag)
+        if any((control.C_L, control.C_M, control.C_N)):
+            watcher.steer(control)
+        progress.line(f'throwing {chosen.disc} at {chosen.speed:g} m/s')
+        watcher.throw()
+        ended = watcher.watch(chosen.seconds, progress.show)
+        progress.line(ended)
+        recorder.end()
+        sim.end()
+
+
+class _Progress:
+    """Lines on stderr; on a terminal also one that changes."""
+
+    def __init__(self) -> None:
+        self._live = sys.stderr.isatty()
+        self._open = False
+
+    def line(self, text: str) -> None:
+        """Write a line."""
+        sys.stderr.write(('\n' if self._open else '') + f'demo: {text}\n')
+        sys.stderr.flush()
+        self._open = False
+
+    def show(self, seen: 'Seen') -> None:
+        """Show the disc, on a terminal."""
+        if self._live:
+            sys.stderr.write(
+                f'\r  {seen.time:5.1f} s  height {seen.height:6.2f} m  '
+                f'speed {seen.speed:5.2f} m/s '
+            )
+            sys.stderr.flush()
+            self._open = True
+
+
+def _report(bag: Path, plot: Path) -> int:
+    """Analyse the bag, write the plot, print the summary; return the exit code."""
+    from disc_sim_ros.analysis import bag_plots, bag_report, bag_text, flights, plots, recording  # noqa: PLC0415
+    from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
+
+    opened = open_bag(bag)
+    disc = recording.discs(opened, '/odom')[0]
+    analyses = [bag_report.analyse(f) for f in flights.flights(disc)]
+    if not analyses:
+        raise DiscSimError(f'{bag}: the throw is not in the bag')
+    title = bag_plots.title(analyses[0])
+    image = plots.image(bag_plots.bag_figure(analyses, title), 'png')
+    output.write_whole('--bag', str(plot), image)
+    size = sum(file.stat().st_size for file in opened.files)
+    losses = bag_report.losses(opened.custom_data)
+    filled = sum(info.message_count > 0 for info in opened.topics)
+    lines = [
+        bag_text.summary(analyses[0]),
+        bag_text.verification(analyses[0]),
+        f'recorded {opened.message_count} messages of {filled} topics, {size / 1e6:.1f} MB, '
+        + (', '.join(f'{key}: {value}' for key, value in losses) or 'nothing lost'),
+    ]
+    lines += [
+        f'  {bag}',
+        f'  {plot}',
+        'to look at it',
+        f'  analyse_bag --verify {bag}',
+        f'  ros2 bag play {bag}',
+        f'  Foxglove: open {opened.files[0]} with the layout {_layout()}',
+    ]
+    output.show('\n'.join(lines))
+    return 0 if all(map(bag_report.passed, analyses)) else DIFFERENT
+
+
+def _layout() -> Path:
+    """Return where the layout for Foxglove is, as short as can be."""
+    name = Path('config', 'foxglove_layout.json')
+    source = Path(disc_sim_ros.__file__).parents[1] / name
+    if source.is_file():
+        here = Path.cwd()
+        return source.relative_to(here) if source.is_relative_to(here) else source
+    return Path(sys.prefix, 'share', 'disc_sim_ros', name)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

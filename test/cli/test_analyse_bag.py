@@ -1,0 +1,375 @@
+"""`analyse_bag` as its users meet it: bags of sim_node, damaged ones, and bags of others."""
+
+import json
+import math
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+
+from analysis import foreign
+from analysis.foreign import START, Parabola
+from matplotlib import image
+import numpy as np
+import pytest
+
+from disc_sim_ros.cli import analyse_bag, fly
+
+EXECUTABLE = Path(sys.executable).with_name('analyse_bag')
+
+
+@pytest.fixture
+def analyse(capsys):
+    """Run `analyse_bag` in this process: exit code, stdout, stderr."""
+
+    def run(*arguments):
+        try:
+            code = analyse_bag.main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            code = end.code
+        return code, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def document(analyse):
+    """Run with --json; return the exit code and the document."""
+
+    def run(*arguments):
+        code, out, err = analyse(*arguments, '--json')
+        assert (err, out.count('\n')) == ('', 1)
+        return code, json.loads(out, parse_constant=pytest.fail)
+
+    return run
+
+
+@pytest.fixture(scope='module')
+def steered(tmp_path_factory):
+    """A bag of a disc that is steered and blown about, lands, and is thrown again."""
+    pytest.importorskip('rclpy')
+    from analysis.bags import steered_bag
+
+    return steered_bag(tmp_path_factory.mktemp('bags') / 'steered')
+
+
+@pytest.fixture
+def part(steered, tmp_path):
+    """Make a copy of that bag that lacks something."""
+    from analysis.bags import copy
+
+    return lambda keep, **more: copy(steered, tmp_path / 'part', keep, **more)
+
+
+def parabola_bag(tmp_path, **changes):
+    messages = Parabola().odometry(**changes)
+    return foreign.write(tmp_path / 'bag', {'/thing/odometry': messages})
+
+
+# ---- bags of sim_node ----
+
+
+def test_a_steered_flight_in_gusts_is_flown_again_to_the_bit(document, steered):
+    code, found = document(steered, '--verify')
+    assert code == 0
+    (disc,) = found['discs']
+    first, second = disc['flights']
+    for flight in (first, second):
+        verified = flight['verification']
+        assert verified['passed']
+        again = verified['re_flight']
+        assert again['exact']
+        assert again['messages'] == again['identical_messages'] == flight['messages']['count']
+        assert set(again['largest_difference'].values()) == {0.0}
+        assert again['doubts'] == []
+    assert len(first['verification']['re_flight']['largest_difference']) == 13 + 5
+    landing = next(e for e in disc['events'] if e['name'] == 'landed')['values']
+    assert first['flight_time_s'] == float(landing['flight_time_s'])
+    assert first['range_m'] == pytest.approx(float(landing['range_m']), rel=1e-15)
+    assert first['spin_left'] == pytest.approx(float(landing['spin_rad_s']) / 31.416)
+    assert [c['topic'] for c in first['changes']].count('applied_coefficients') == 3
+    assert (first['ended'], second['ended']) == ('landed', 'reset')
+    assert (second['landed'], second['landing_position_m']) == (False, None)
+    launch = first['launch']
+    assert launch['speed_m_s'] == pytest.approx(14.0)
+    assert launch['pitch_deg'] == pytest.approx(2.0)
+    assert first['setup']['wind']['turbulence'] == 12.0
+
+
+def test_what_it_says_is_what_fly_says(document, capsys, tmp_path):
+    pytest.importorskip('rclpy')
+    text = '--disc wraith --speed 22 --pitch 8 --spin 90 --height 1.2 --control 0 0.004 0'
+    flags = text.split()
+    assert fly.main([*flags, '--bag', str(tmp_path / 'bag')]) == 0
+    assert re.search(r'  wrote   \S+/bag: \d+ messages of \d+ topics', capsys.readouterr().out)
+    assert fly.main([*flags, '--json']) == 0
+    flown = json.loads(capsys.readouterr().out)
+    code, found = document(tmp_path / 'bag', '--verify')
+    assert code == 0
+    (flight,) = found['discs'][0]['flights']
+    assert flight['landing_position_m'] == flown['landing_position_m']
+    assert flight['flight_time_s'] == flown['flight_time_s']
+    for key in ('range_m', 'drift_m', 'end_spin_rad_s'):
+        assert flight[key] == pytest.approx(flown[key], rel=1e-12), key
+    # The highest of samples, 5 ms apart: at most g t^2 / 2 below the top.
+    assert 0.0 <= flown['apex_m'] - flight['apex_m'] < 9.81 * 0.0025**2
+    for key in ('speed_m_s', 'pitch_deg', 'roll_deg', 'spin_rad_s', 'height_m'):
+        assert flight['launch'][key] == pytest.approx(flown['launch'][key], abs=1e-12), key
+
+
+def test_without_a_command_it_differs_and_says_since_when(analyse, document, part):
+    bag = part(lambda m: m.topic != '/applied_coefficients', custom_data={'drops': '/odom 3'})
+    code, found = document(bag, '--verify')
+    assert code == analyse_bag.DIFFERENT == 3
+    first, second = (f['verification']['re_flight'] for f in found['discs'][0]['flights'])
+    assert not first['exact']
+    assert second['exact']
+    # Commanded 223.4 ms after START, released at 100 or a message later, seen a message later.
+    assert 0.116 < first['first_difference_s'] < 0.1234 + 1 / 150
+    assert first['largest_difference']['position.x_m'] > 0.01
+    assert 'drops: /odom 3' in first['doubts']
+    code, out, _ = analyse(bag, '--verify')
+    assert code == 3
+    assert 'DIFFERENT' in out
+    assert 'because: drops: /odom 3' in out
+    assert analyse(bag)[0] == 0  # without --verify nothing is judged
+
+
+def test_lost_odometry_is_counted_and_does_no_harm(document, part):
+    lost = iter(range(10_000))
+    bag = part(lambda m: m.topic != '/odom' or next(lost) not in {40, 41, 60})
+    code, found = document(bag, '--verify')
+    assert code == 0
+    messages = found['discs'][0]['flights'][0]['messages']
+    assert messages['missing'] == 3
+    assert messages['longest_gap_s'] == pytest.approx(3 / 150, abs=1e-8)
+
+
+def test_a_bag_that_begins_in_flight_says_what_it_lacks(document, part):
+    from analysis import bags
+
+    begin = bags.START + 400 * bags.MS
+
+    def late(m):
+        return m.log_time >= begin or m.topic in {'/release', '/configuration'}
+
+    code, found = document(part(late), '--verify')
+    assert code == 3
+    first = found['discs'][0]['flights'][0]
+    assert first['starts_late_s'] == pytest.approx(0.3, abs=0.01)
+    assert first['launch']['speed_m_s'] == pytest.approx(14.0)  # as configured
+    (doubt,) = first['verification']['re_flight']['doubts']
+    assert 'the bag begins 0.29' in doubt
+
+
+def test_a_change_of_the_profile_of_the_wind_is_named(document, tmp_path):
+    pytest.importorskip('rclpy')
+    from analysis import bags
+    from rcl_interfaces.msg import Parameter, ParameterEvent
+    from rclpy.serialization import serialize_message
+
+    from disc_sim_ros.bags.writer import BagWriter
+    from disc_sim_ros.nodes.sim_config import configuration
+
+    rougher = {'wind.roughness_length': 0.8}
+    with BagWriter(tmp_path / 'bag') as writer:
+        events = bags.BagMedium(writer).channel(ParameterEvent, '/parameter_events', bags.QOS)
+        made = bags.Made(writer)
+        made.go(0.2)
+        made.requests.append(
+            lambda: made.simulation.configure(configuration(bags.PARAMETERS | rougher))
+        )
+        changed = [Parameter(name='wind.roughness_length')]
+        told = ParameterEvent(node='/sim_node', changed_parameters=changed)
+        now = made.simulation.timeline.now
+        writer.write(events._topic, serialize_message(told), now, now)
+        made.go(0.2)
+    code, found = document(tmp_path / 'bag', '--verify')
+    assert code == 3
+    again = found['discs'][0]['flights'][0]['verification']['re_flight']
+    assert 0.19 < again['first_difference_s'] < 0.22
+    assert any('profile of the wind was changed' in doubt for doubt in again['doubts'])
+
+
+def test_topics_that_were_not_recorded_are_named(document, part, steered, tmp_path):
+    from disc_sim_ros.bags.reader import open_bag
+    from disc_sim_ros.bags.writer import BagWriter
+
+    kept = ('/odom', '/release', '/configuration')
+    bag = open_bag(steered)
+    with BagWriter(tmp_path / 'few') as writer:
+        ids = {i.topic.name: writer.add(i.topic) for i in bag.topics if i.topic.name in kept}
+        for m in bag.raw(kept):
+            writer.write(ids[m.topic], m.data, m.log_time, m.publish_time)
+    code, found = document(tmp_path / 'few', '--verify')
+    assert code == 3
+    doubts = found['discs'][0]['flights'][0]['verification']['re_flight']['doubts']
+    assert 'not recorded: applied_moment, applied_coefficients, applied_wind' in doubts
+
+
+def test_an_unfinished_bag_is_read_and_called_so(analyse, steered, tmp_path):
+    shutil.copytree(steered, tmp_path / 'steered')
+    file = tmp_path / 'steered' / 'steered_0.mcap'
+    file.write_bytes(file.read_bytes()[:-2000])  # in the index
+    code, out, err = analyse(tmp_path / 'steered', '--verify')
+    assert code == 0
+    assert re.fullmatch(r'analyse_bag: note: \S+ was not ended.*`repair_bag`.*\n', err)
+    assert 'identical to the last bit' in out
+
+
+def test_two_discs_of_one_topic_have_a_report_each(document, analyse, tmp_path):
+    pytest.importorskip('rclpy')
+    from analysis import bags
+
+    from disc_sim_ros.bags.writer import BagWriter
+
+    with BagWriter(tmp_path / 'red') as writer:
+        bags.Made(writer, frame_prefix='red/').go(0.5)
+    with BagWriter(tmp_path / 'blue') as writer:
+        bags.Made(writer, frame_prefix='blue/', **{'wind.seed': 4}).go(0.4)
+    with BagWriter(tmp_path / 'both') as writer:
+        ids = {}
+        for colour in ('red', 'blue'):
+            bag = bags.open_bag(tmp_path / colour)
+            for info in bag.topics:
+                if info.topic.name not in ids:
+                    ids[info.topic.name] = writer.add(info.topic)
+            for m in bag.raw():
+                writer.write(ids[m.topic], m.data, m.log_time, m.publish_time)
+    code, found = document(tmp_path / 'both', '--verify')
+    assert code == 0
+    assert [(d['disc'], d['child_frame']) for d in found['discs']] == [
+        ('red', 'red/disc'),
+        ('blue', 'blue/disc'),
+    ]
+    seeds = [d['flights'][0]['setup']['wind']['seed'] for d in found['discs']]
+    assert seeds == [bags.PARAMETERS['wind.seed'], 4]
+    code, found = document(tmp_path / 'both', '--disc', 'blue')
+    assert [d['disc'] for d in found['discs']] == ['blue']
+    code, _, err = analyse(tmp_path / 'both', '--disc', 'green')
+    assert code == 2
+    assert 'choose from red, blue' in err
+
+
+# ---- bags of others ----
+
+
+def test_a_bag_of_others_is_measured_and_its_kinematics_checked(document, tmp_path):
+    parabola = Parabola()
+    code, found = document(parabola_bag(tmp_path), '--verify')
+    assert code == 0
+    (disc,) = found['discs']
+    assert (disc['topic'], disc['child_frame']) == ('/thing/odometry', 'body')
+    (flight,) = disc['flights']
+    launch = flight['launch']
+    assert launch['speed_m_s'] == pytest.approx(parabola.speed)
+    assert launch['climb_deg'] == pytest.approx(parabola.climb)
+    assert launch['heading_deg'] == pytest.approx(-parabola.heading)  # right positive
+    assert launch['spin_rad_s'] == pytest.approx(parabola.spin)
+    assert launch['frame_spins']
+    # Between two messages the path is taken for straight, g dt^2 / 8 above the ground.
+    assert flight['flight_time_s'] == pytest.approx(parabola.time, abs=2e-5)
+    assert flight['range_m'] == pytest.approx(math.hypot(*parabola.landing), abs=2e-4)
+    assert flight['apex_m'] == pytest.approx(parabola.apex, abs=9.81 * 0.005**2)
+    verified = flight['verification']
+    assert 'no configuration' in verified['not_flown_again']
+    assert {n: c['passed'] for n, c in verified['checks'].items()} == {
+        'stamps': True,
+        'quaternion_norm': True,
+        'velocity': True,
+    }
+
+
+def test_a_twist_in_the_wrong_frame_is_found(analyse, tmp_path):
+    code, out, _ = analyse(parabola_bag(tmp_path, in_map=True), '--verify')
+    assert code == 3
+    assert 'velocity: WRONG' in out
+    assert 'it is given in map' in out
+
+
+def test_topics_that_only_have_the_names_of_ours_do_no_harm(document, tmp_path):
+    texts = ['disc: 3', '[1, 2]', '{', 'disc: a\nmodel: b\nrelease: {X: 1}\nwind: {}']
+    bag = foreign.write(
+        tmp_path / 'bag',
+        {
+            '/odom': Parabola().odometry(),
+            '/configuration': [(START + i, foreign.text(text)) for i, text in enumerate(texts)],
+            '/release': Parabola().odometry()[:1],
+            '/flight_events': [(START, foreign.text('landed'))],
+        },
+    )
+    code, found = document(bag, '--verify')
+    assert code == 0
+    (flight,) = found['discs'][0]['flights']
+    assert 'no configuration' in flight['verification']['not_flown_again']
+
+
+def test_numbers_that_are_none_do_no_harm(document, tmp_path):
+    parabola = Parabola()
+    parabola.position[40] = np.nan
+    bag = foreign.write(tmp_path / 'bag', {'/odom': parabola.odometry()})
+    _, found = document(bag, '--verify')
+    assert [f['ended'] for f in found['discs'][0]['flights']] == ['rest', 'end of the bag']
+
+
+# ---- what it writes and refuses ----
+
+
+def test_the_plot_is_a_picture_and_nothing_without_a_flight(analyse, steered, tmp_path):
+    code, out, err = analyse(steered, '--plot', tmp_path / 'flight.png')
+    assert (code, err) == (0, '')
+    assert f'wrote {tmp_path}/flight.png' in out
+    pixels = image.imread(tmp_path / 'flight.png')
+    assert pixels.shape[0] > pixels.shape[1]  # with a row for what was commanded
+    turn = (0, 0, 0, 1)
+    still = [(at, foreign.odometry(at, (0, 0, 1), turn, (0, 0, 0), (0, 0, 0)))
+             for at in range(START, START + 100)]  # fmt: skip
+    bag = foreign.write(tmp_path / 'still', {'/odom': still})
+    code, out, _ = analyse(bag)
+    assert code == 0
+    assert 'no flight' in out
+    code, _, err = analyse(bag, '--plot', tmp_path / 'none.png')
+    assert code == 1
+    assert 'nothing flies' in err
+    assert not (tmp_path / 'none.png').exists()
+
+
+def refused(result, *fragments):
+    code, out, err = result
+    assert (code, out) == (2, '')
+    assert re.fullmatch(r'analyse_bag: error: [^\n]+\n', err)
+    for fragment in fragments:
+        assert fragment in err
+
+
+def test_what_is_no_bag_of_motion_is_refused_in_one_line(analyse, tmp_path):
+    refused(analyse(tmp_path / 'nothing'), 'no such bag')
+    (tmp_path / 'folder').mkdir()
+    refused(analyse(tmp_path / 'folder'), 'no bag')
+    (tmp_path / 'x.mcap').write_text('hello')
+    refused(analyse(tmp_path / 'x.mcap'), 'no MCAP file')
+    words = {'/chatter': [(START, foreign.text('hi'))]}
+    bag = foreign.write(tmp_path / 'words', words)
+    refused(analyse(bag), 'no nav_msgs/msg/Odometry', '/chatter (std_msgs/msg/String)')
+    refused(analyse(bag, '--topic', 'odom'), 'no topic odom', '/chatter')
+    refused(analyse(bag, '--topic', '/chatter'), '/chatter is std_msgs/msg/String')
+    empty = foreign.write(tmp_path / 'empty', {'/odom': 'nav_msgs/msg/Odometry'})
+    refused(analyse(empty), 'the bag is empty')
+    refused(analyse(bag, '--plot', tmp_path / 'x.gif'), '--plot')
+    refused(analyse(), 'BAG')
+
+
+def test_help_tells_units_and_needs_no_ros():
+    code = "import sys; sys.modules['rclpy'] = None; from disc_sim_ros.cli.analyse_bag import main"
+    result = subprocess.run(
+        [sys.executable, '-c', f'{code}; main(["--help"])'],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert result.stdout.startswith('usage: analyse_bag')
+    assert 'm/s' in result.stdout.replace('(m, s)', 'm/s')
+    assert '3: --verify found a difference' in ' '.join(result.stdout.split())
+    assert EXECUTABLE.exists()
