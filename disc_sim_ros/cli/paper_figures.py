@@ -1,0 +1,191 @@
+"""`paper_figures`: every figure of the paper, its numbers beside ours, and one report."""
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+import multiprocessing
+import os
+from pathlib import Path
+import signal
+import sys
+import tempfile
+import time
+from typing import TYPE_CHECKING
+
+from disc_sim_ros import __version__
+from disc_sim_ros.cli import output
+from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.core import flight
+from disc_sim_ros.core.errors import ConfigError, DiscSimError
+
+if TYPE_CHECKING:
+    from disc_sim_ros.experiments.run import Done
+
+FORMATS = ('png', 'svg')
+PARTS = ('3', '4', '5', '6', '7', '8', '9', '10', '11', '12', 'models', 'roll_rate', 'statements')
+SLOW = {'5', '6', 'models', 'statements'}  # begun first
+MOST_JOBS = 64
+
+
+def parser() -> Parser:
+    """Return the command line of `paper_figures`."""
+    p = Parser(
+        prog='paper_figures',
+        description='Compute and draw the figures of Crowther & Potts, Sports Engineering 10 '
+        "(2007) 3-21, with the paper's numbers beside ours. Writes report.html, report.md, "
+        'pictures and a CSV for each figure; units (m, s, m/s, degrees, rad/s) stand in every '
+        'axis label and CSV header. Takes less than a minute, no ROS.',
+    )
+    p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    text = 'folder to write to, made if it is not there; only files of these names are overwritten'
+    p.add_argument('--out', default='paper_figures', metavar='DIR', help=text)
+    p.add_argument(
+        '--only',
+        type=_list_of(PARTS),
+        default=PARTS,
+        metavar='PARTS',
+        help=f'comma-separated, from {", ".join(PARTS)} (default: all)',
+    )
+    p.add_argument(
+        '--formats',
+        type=_list_of(FORMATS),
+        default=FORMATS,
+        metavar='KINDS',
+        help='comma-separated, from png, svg (default: both)',
+    )
+    text = "draw each picture for a dark background too; the report follows the reader's setting"
+    p.add_argument('--dark', action=argparse.BooleanOptionalAction, default=True, help=text)
+    jobs = min(2, os.cpu_count() or 1)
+    text = f'processes at a time, a whole number from 1 to {MOST_JOBS}'
+    p.add_argument('--jobs', type=_jobs, default=jobs, metavar='N', help=text)
+    return p
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run `paper_figures`; return its exit code: 0, 1 if it failed, 2 for bad input."""
+    output.mend_streams()
+    p = parser()
+    chosen = p.parse_args(arguments)
+    try:
+        _run(chosen)
+    except ConfigError as error:
+        p.error(str(error))
+    except (DiscSimError, BrokenProcessPool) as error:
+        sys.stderr.write(f'paper_figures: error: {error}\n')
+        return 1
+    except OSError as error:
+        what = error.strerror or str(error)
+        sys.stderr.write(f'paper_figures: error: cannot write to {chosen.out} ({what})\n')
+        return 1
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    return 0
+
+
+def _run(chosen: argparse.Namespace) -> None:
+    started = time.perf_counter()
+    folder = made(chosen.out)
+    # Not before the arguments are known to be good: matplotlib and scipy take a second.
+    from disc_sim_ros.experiments import run  # noqa: PLC0415
+
+    if not flight.is_ready():
+        sys.stderr.write(
+            'paper_figures: note: compiling the equations of motion, once on this machine, about '
+            '10 s\n'
+        )
+        with output.ended_by_ctrl_c():
+            _compile()
+    total = len(chosen.only)
+    output.show(f'{total} parts into {folder}/, {min(chosen.jobs, total)} at a time')
+    done: list[Done] = []
+    for one in _parts(chosen, folder):
+        done.append(one)
+        output.show(f'[{len(done):2d}/{total}] {one.title}, {one.seconds:.1f} s')
+    found = run.write_report(done, folder, dark=chosen.dark)
+    output.show('\n'.join(found.summary()))
+    seconds = time.perf_counter() - started
+    output.show(f'wrote {folder / "report.html"} and {folder / "report.md"} in {seconds:.0f} s')
+
+
+def made(name: str) -> Path:
+    """Return the folder to write to, made if need be.
+
+    Raises:
+        ConfigError: It is no folder, or nothing can be written in it.
+    """
+    folder = Path(name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except FileExistsError:
+        raise ConfigError('--out', name, 'it is not a folder; give a folder') from None
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        reason = getattr(error, 'strerror', None) or str(error)
+        raise ConfigError('--out', name, f'cannot write there ({reason})') from None
+    return folder
+
+
+def _parts(chosen: argparse.Namespace, folder: Path) -> Iterator['Done']:
+    """Yield the parts as they get done."""
+    from disc_sim_ros.experiments import run  # noqa: PLC0415
+
+    if chosen.jobs == 1 or len(chosen.only) == 1:
+        for key in chosen.only:
+            yield run.part(key, folder, chosen.formats, dark=chosen.dark)
+        return
+    # Fresh processes: a copy of this one could not use numba's threads and locks.
+    context = multiprocessing.get_context('spawn')
+    jobs = min(chosen.jobs, len(chosen.only))
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_end_at_ctrl_c)
+    try:
+        waiting = [
+            pool.submit(run.part, key, folder, chosen.formats, dark=chosen.dark)
+            for key in sorted(chosen.only, key=lambda key: key not in SLOW)
+        ]
+        for future in as_completed(waiting):
+            yield future.result()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    pool.shutdown()
+
+
+def _end_at_ctrl_c() -> None:
+    """Let Ctrl-C, which a terminal sends to all, end a process without a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _compile() -> None:
+    from disc_sim_ros.core import catalogue  # noqa: PLC0415
+    from disc_sim_ros.core.launch import Launch  # noqa: PLC0415
+
+    setup = flight.Setup(disc=catalogue.load('frisbee'))
+    flight.fly(Launch(), setup, duration=0.01, ground=False)
+
+
+def _list_of(allowed: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+    def convert(text: str) -> tuple[str, ...]:
+        words = [word.strip().lower() for word in text.split(',')]
+        for word in words:
+            if word not in allowed:
+                message = f'{word!r} is not allowed; choose from {", ".join(allowed)}'
+                raise argparse.ArgumentTypeError(message)
+        return tuple(word for word in allowed if word in words)
+
+    return convert
+
+
+def _jobs(text: str) -> int:
+    number = int(text) if text.isascii() and text.isdigit() and len(text) < 4 else 0
+    if not 1 <= number <= MOST_JOBS:
+        message = f'{text!r} is not allowed; give a whole number from 1 to {MOST_JOBS}'
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
+if __name__ == '__main__':
+    sys.exit(main())
