@@ -1,7 +1,9 @@
 """The examples, started as their first lines say, against a simulator in its own process."""
 
+from dataclasses import replace
 import importlib.util
 import itertools
+import math
 from pathlib import Path
 import re
 import signal
@@ -14,11 +16,15 @@ pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
+import numpy as np
 
+from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.air import Wind
 from disc_sim_ros.core.equations import Control
 from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.core.simulator import FlightSimulator
 from disc_sim_ros.nodes import topics
 
 pytestmark = pytest.mark.ros
@@ -52,8 +58,10 @@ def run(name: str, *arguments: str, code: int = 0) -> str:
 
 
 @pytest.fixture
-def load(ros_environment):
+def load(ros_environment, monkeypatch):
     """A function that loads an example, to call its `main` in the test's process."""
+
+    monkeypatch.syspath_prepend(str(EXAMPLES))  # as for a script that is started there
 
     def loaded(name: str):
         spec = importlib.util.spec_from_file_location(Path(name).stem, EXAMPLES / name)
@@ -157,3 +165,48 @@ def test_help_tells_units_and_a_wrong_flag_ends_with_2(name, ros_environment):
     _, errors = process.communicate(timeout=DEADLINE)
     assert process.returncode == 2
     assert '--sped' in errors
+
+
+@pytest.mark.parametrize('wind_y', [0.0, 3.0, -3.0])
+@pytest.mark.parametrize(
+    ('launch', 'target'), [(Launch(roll=10.0), (26.0, 0.0)), (Launch(), (22.0, 5.0))]
+)
+def test_the_pilot_lands_a_disc_at_a_target_in_wind_that_it_does_not_know(
+    load, launch, target, wind_y
+):
+    pilot = load('steer_to_target.py').Pilot(FRISBEE.disc, np.array(target) * (1.0, -1.0))
+    air = replace(FRISBEE, wind=Wind(mean=(0.0, -wind_y, 0.0)))
+    assert math.dist(fly(launch, air).position[:2], target) > 5.0
+    sim = FlightSimulator(air, launch.state())
+    while not sim.landed:
+        C_L, C_M = pilot.command(sim.time, sim.state).tolist()
+        sim.control = Control(C_L, C_M, 0.0)
+        sim.advance(20)
+    assert math.dist((sim.touch.X, -sim.touch.Y), target) < 1.0
+    np.testing.assert_allclose(pilot.wind, (0.0, -wind_y), atol=0.2)
+
+
+def test_steer_to_target_ends_with_a_bag_and_a_plot_within_a_metre(tmp_path):
+    options = ('--target', '26', '0', '--roll', '10', '--wind', '0', '3', '0', '--pace', '0.7')
+    output = run('steer_to_target.py', *options, '--folder', str(tmp_path / 'x'))
+    assert 'identical to the last bit' in output
+    assert (tmp_path / 'x/flight.png').stat().st_size > 10_000
+    assert open_bag(tmp_path / 'x/bag').complete
+    unsteered = re.search(r'misses by (\d+\.\d+) m', output)
+    steered = re.search(r'(\d+\.\d+) m from the target', output)
+    assert float(unsteered[1]) > 5.0
+    assert float(steered[1]) < 1.0
+
+
+def test_spiral_flies_the_manoeuvre_of_the_paper(tmp_path, load):
+    output = run('spiral.py', 'turn', '--folder', str(tmp_path / 'x'), '--pace', '2')
+    assert 'identical to the last bit' in output
+    module = load('spiral.py')
+    turn = module.MANOEUVRES['turn']
+    spin = module.parameters(turn)['launch.spin']
+    expected = fly(Launch(**turn.launch, spin=spin), FRISBEE, control=Control(*turn.command))
+    line = output.splitlines()[-1]
+    found = re.search(r'x (-?[\d.]+) m, y (-?[\d.]+) m, .* after ([\d.]+) s', line)
+    x, y, time = map(float, found.groups())
+    assert (x, y) == pytest.approx(expected.position[:2], abs=0.006)  # two digits
+    assert time == pytest.approx(expected.time, abs=0.006)

@@ -1,0 +1,181 @@
+"""Record Odometry at 10 kHz: what is lost, what it costs, beside a plain callback and mcap alone.
+
+.venv/bin/python benchmarks/recorder.py [seconds, 60]
+"""
+
+from collections.abc import Callable
+import os
+from pathlib import Path
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+from mcap.writer import Writer
+from nav_msgs.msg import Odometry
+import rclpy
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
+
+from disc_sim_ros.bags import schemas
+from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.nodes import conversions, live
+from disc_sim_ros.nodes.topics import STATE_QOS
+from disc_sim_ros.nodes.wire import Wire
+
+RATE = 10_000  # Hz
+BURST = 0.001  # s between two bursts of messages
+TYPE = 'nav_msgs/msg/Odometry'
+NUMBER = struct.Struct('<d')
+TICKS = os.sysconf('SC_CLK_TCK')
+PAGE = os.sysconf('SC_PAGE_SIZE')
+
+
+def odometry() -> Odometry:
+    """Return a message as sim_node publishes it."""
+    message = Odometry(child_frame_id='disc')
+    message.header.frame_id = 'map'
+    return message
+
+
+def place_of_number() -> int:
+    """Return where position.x, which carries the number of a message, is in its bytes."""
+    message = odometry()
+    message.pose.pose.position.x = 12345.6789
+    return serialize_message(message).index(NUMBER.pack(12345.6789))
+
+
+def publish(seconds: float) -> None:
+    """Publish numbered messages: the body of the publishing process."""
+    rclpy.init()
+    node = Node('publisher')
+    publisher = node.create_publisher(Odometry, 'odom', STATE_QOS)
+    pack = Wire(odometry(), conversions.ODOMETRY_FIELDS).pack
+    rest = (0.0,) * (len(conversions.ODOMETRY_FIELDS) - 1)
+    while not publisher.get_subscription_count():
+        time.sleep(0.05)
+    time.sleep(1.0)
+    begun, n = time.monotonic(), 0
+    while n < seconds * RATE:
+        due = min(round((time.monotonic() - begun) * RATE), round(seconds * RATE))
+        for number in range(n, due):
+            publisher.publish(pack(0, 0, float(number), *rest))
+        n = max(n, due)
+        time.sleep(BURST)
+    print(f'{n / (time.monotonic() - begun):.0f}', flush=True)
+    time.sleep(2.0)  # for the last to be acknowledged
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def record_plainly(file: str) -> None:
+    """Record in an ordinary callback: the body of the process beside which ours stands."""
+    ended: list[int] = []
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    signal.signal(signal.SIGINT, lambda number, _: ended.append(number))
+    node = Node('plain_recorder')
+    with Path(file).open('wb') as stream:
+        writer, channel = begun(stream)
+
+        def write(data: bytes) -> None:
+            now = time.time_ns()
+            writer.add_message(channel, now, data, now)
+
+        node.create_subscription(Odometry, 'odom', write, 10, raw=True)
+        while not ended:
+            rclpy.spin_once(node, timeout_sec=0.1)
+        writer.finish()
+
+
+def begun(stream: object) -> tuple[Writer, int]:
+    """Return a writer of the mcap package, and the channel of the odometry."""
+    writer = Writer(stream)
+    writer.start('ros2')
+    schema = writer.register_schema(TYPE, 'ros2msg', (schemas.definition(TYPE) or '').encode())
+    return writer, writer.register_channel('/odom', 'cdr', schema)
+
+
+def usage(pid: int) -> tuple[float, float]:
+    """Return the CPU time [s] and the memory [MB] of a process."""
+    fields = Path(f'/proc/{pid}/stat').read_text(encoding='utf-8').rpartition(')')[2].split()
+    cpu = (int(fields[11]) + int(fields[12])) / TICKS
+    return cpu, int(fields[21]) * PAGE / 1e6
+
+
+def measured(recorder: list[str], seconds: float) -> tuple[float, list[float], float]:
+    """Run a recorder and the publisher; return the CPU of a core, the memory [MB], the rate."""
+    process = subprocess.Popen(recorder, stderr=subprocess.DEVNULL)
+    sender = subprocess.Popen(
+        [sys.executable, __file__, 'publish', str(seconds)], stdout=subprocess.PIPE, text=True
+    )
+    time.sleep(4.0)  # until they have found each other
+    cpu, memory = usage(process.pid)
+    start, found = time.monotonic(), [memory]
+    for _ in range(3):
+        time.sleep((seconds - 2.0) / 3)
+        found.append(usage(process.pid)[1])
+    share = (usage(process.pid)[0] - cpu) / (time.monotonic() - start)
+    rate = float(sender.communicate()[0])
+    process.send_signal(signal.SIGINT)
+    process.wait()
+    return share, found, rate
+
+
+def numbers(messages: Callable[[], object]) -> list[int]:
+    """Return the numbers of recorded messages."""
+    at = place_of_number()
+    return [int(NUMBER.unpack_from(m.data, at)[0]) for m in messages()]  # type: ignore[attr-defined]
+
+
+def alone(messages: int, file: Path) -> float:
+    """Return how many messages mcap.Writer writes in a second of CPU time."""
+    data = serialize_message(odometry())
+    start = time.process_time()
+    with file.open('wb') as stream:
+        writer, channel = begun(stream)
+        for n in range(messages):
+            writer.add_message(channel, n, data, n)
+        writer.finish()
+    return messages / (time.process_time() - start)
+
+
+def main() -> None:
+    """Measure and print."""
+    if sys.argv[1:2] == ['publish']:
+        publish(float(sys.argv[2]))
+        return
+    if sys.argv[1:2] == ['plain']:
+        record_plainly(sys.argv[2])
+        return
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
+    with tempfile.TemporaryDirectory() as scratch, live.own_domain():
+        folder = Path(scratch)
+        total = round(seconds * RATE)
+        ours = [sys.executable, '-m', 'disc_sim_ros.nodes.recorder_node', '--ros-args']
+        ours += ['-p', f'bag:={folder / "bag"}', '-p', 'topics:=/odom']
+        share, memory, rate = measured(ours, seconds)
+        bag = open_bag(folder / 'bag')
+        found = numbers(lambda: bag.raw(['/odom']))
+        kept = 'in order' if found == list(range(total)) else 'NOT ALL, OR NOT IN ORDER'
+        print(f'published {total} messages at {rate:.0f} Hz')
+        print(
+            f'recorder_node: {len(found)} recorded, {kept}; {share:.1%} of a core; memory', end=''
+        )
+        print(f' {", ".join(f"{m:.0f}" for m in memory)} MB over the time')
+        plain = [sys.executable, __file__, 'plain', str(folder / 'plain.mcap')]
+        plain_share, _, _ = measured(plain, min(seconds, 10.0))
+        total = round(min(seconds, 10.0) * RATE)
+        count = len(numbers(lambda: open_bag(folder / 'plain.mcap').raw(['/odom'])))
+        print(f'plain callback: {count} of {total} recorded, {count / total:.1%}', end='')
+        print(f'; {plain_share:.1%} of a core')
+        writer = alone(100_000, folder / 'alone.mcap')
+        print(f'mcap.Writer alone: {writer:.0f} messages per CPU-second', end='')
+        print(f'; recorder_node, network included: {rate / share:.0f}', end='')
+        print(f', {rate / share / writer:.2f} of it')
+
+
+if __name__ == '__main__':
+    main()
