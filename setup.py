@@ -105,6 +105,7 @@ setup(
             'distributed>=2024.5',
             'pytest>=8,<10',
             'pytest-timeout>=2.3,<3',
+            'pytest-xdist>=3.5,<4',
             'hypothesis>=6.100,<7',
             'rosbags>=0.10.4,<1',
             'ruff>=0.14,<1',
