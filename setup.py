@@ -98,7 +98,7 @@ setup(
             'ros-jazzy-rclpy[fastrtps]',
             'ros-jazzy-common-interfaces',
         ],
-        # `sweep --dask`.
+        # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
         'test': [
             'dask>=2024.5',

@@ -1,6 +1,7 @@
 """Errors that this package raises on purpose; each carries one line that a user can act on."""
 
 import reprlib
+from typing import Self
 
 _LONGEST = 80  # characters
 _SHORT = reprlib.Repr()
@@ -21,6 +22,10 @@ class ConfigError(DiscSimError, ValueError):
         self.value = value
         self.allowed = allowed
         super().__init__(f'{thing}: {brief(value)} is not allowed; {allowed}')
+
+    def __reduce__(self) -> tuple[type[Self], tuple[str, object, str]]:
+        """Let it come home from another process, which hands over the arguments."""
+        return type(self), (self.thing, self.value, self.allowed)
 
 
 class IntegrationError(DiscSimError, ArithmeticError):

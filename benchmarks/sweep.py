@@ -1,0 +1,72 @@
+"""Measure `sweep`: time, CPU and peak memory over the number of flights.
+
+Usage: python benchmarks/sweep.py [--longest SECONDS] [--short] [COUNT ...]
+
+Each count is one run of the program, a Monte Carlo of six scattered quantities of the Fig. 5 throw
+into a Parquet file, with its summary; time and memory are those that the system reports for it.
+--short flies one step of 20 ms each: what drawing, writing, joining and summing up cost alone.
+"""
+
+import argparse
+import os
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+import time
+
+SCATTER = ('speed=1', 'pitch=2', 'roll=3', 'yaw=2', 'spin=1', 'lift_factor=0.03')
+PROGRAM = Path(sys.executable).with_name('sweep')
+
+
+def measure(count: int, folder: Path, *, short: bool) -> tuple[float, float, int, int]:
+    """Return wall time [s], CPU time [s], peak memory [bytes] and size of the file [bytes]."""
+    words = [str(PROGRAM), '--count', str(count), '--step', '0.02', '--output', 'a.parquet']
+    words += ['--force', *(word for text in SCATTER for word in ('--scatter', text))]
+    words += ['--no-ground', '--duration', '0.02'] if short else []
+    started = time.perf_counter()
+    with subprocess.Popen(
+        words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    seconds = time.perf_counter() - started
+    if process.returncode:
+        raise SystemExit(f'sweep ended with code {process.returncode}')
+    size = (folder / 'a.parquet').stat().st_size
+    return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * _unit(), size
+
+
+def _unit() -> int:
+    return 1 if sys.platform == 'darwin' else 1024
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('counts', metavar='COUNT', nargs='*', type=int)
+    parser.add_argument('--longest', type=float, default=360.0, help='stop before a longer run')
+    parser.add_argument('--short', action='store_true', help='flights of one step')
+    chosen = parser.parse_args()
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
+    print(f'{cores} cores, load {os.getloadavg()[0]:.1f}', flush=True)
+    print('    flights   wall s    CPU s  flights/s  flights/CPU-s  peak MiB  file MB', flush=True)
+    rate = 0.0
+    with tempfile.TemporaryDirectory() as name:
+        measure(2, Path(name), short=chosen.short)  # compiles
+        start = measure(2, Path(name), short=chosen.short)[0]
+        for count in chosen.counts or [10**3, 10**4, 10**5, 10**6, 10**7]:
+            if rate and count / rate > chosen.longest:
+                print(f'{count:11d}   would take {count / rate:.0f} s: not flown')
+                continue
+            wall, cpu, memory, size = measure(count, Path(name), short=chosen.short)
+            rate = count / max(wall - start, 0.1)
+            print(
+                f'{count:11d} {wall:8.2f} {cpu:8.2f} {count / wall:10.0f} {count / cpu:14.0f} '
+                f'{memory / 2**20:9.0f} {size / 1e6:8.1f}',
+                flush=True,
+            )
+
+
+if __name__ == '__main__':
+    main()
