@@ -1,7 +1,7 @@
 # Targets of one line; the work is in tools/. PYTHON=... chooses the interpreter for .venv.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test test lint fly bench bench-flights clean
+.PHONY: help setup setup-test test lint fly bench bench-flights fuzz clean
 
 # A sourced ROS installation must not mix with the ROS in .venv, and a Python started by the ROS
 # wheels hands down a guard that would keep those of .venv from starting.
@@ -44,6 +44,9 @@ bench-flights: setup-test ## measure flights per second
 bench: setup-test ## measure flights, ensembles, node, bags and recorder; some minutes, on a quiet machine
 	@for name in flights ensemble node bag_writer bag_killed recorder; do \
 		echo "== benchmarks/$$name.py"; $(BIN)/python benchmarks/$$name.py || exit 1; done
+
+fuzz: setup-test ## fuzz every input, 10 minutes each (after .venv/bin/pip install -e .[fuzz])
+	@nice -n 19 $(BIN)/python benchmarks/fuzz/run.py all --seconds 600
 
 clean: ## remove .venv, builds and caches; keep flights/ and bags/
 	rm -rf .venv build dist install log *.egg-info .coverage .hypothesis \

@@ -21,7 +21,7 @@ EXECUTABLES = {
     'sweep': 'disc_sim_ros.cli.sweep:main',
 }
 
-SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz')
+SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz', 'security')
 
 
 class DataDistribution(Distribution):
@@ -100,7 +100,9 @@ setup(
         ],
         # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
+        'fuzz': ['atheris>=2.3,<4'],
         'test': [
+            'packaging>=23',
             'dask>=2024.5',
             'distributed>=2024.5',
             'pytest>=8,<10',

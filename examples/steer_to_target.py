@@ -1,6 +1,6 @@
 """Close the loop from `odom`: steer a thrown disc to land at a given point, in unknown wind.
 
-    .venv/bin/python examples/steer_to_target.py --target 26 0 --roll 10 --wind 0 3 0
+    .venv/bin/python examples/steer_to_target.py --target 26 0 --roll 10 --wind 0 -3 0
 
 Fifty times a second the pilot asks where the disc would land, and changes its plan so that this
 is the target. The plan is two pairs of the paper's C_L and C_M, one for now, one for later. It

@@ -13,6 +13,7 @@ from disc_sim_ros.core.disc import FloatArray
 
 UNIT = 1e-3  # how far a quaternion may be from length 1; sim_node takes no worse in a throw
 FITTING = 0.05  # of the speed; by how much velocity may differ from the differences of position
+_SHORTEST = 1e-6  # length of a quaternion that tells an attitude
 _UNEVEN = 0.5  # of the usual distance of stamps; what is farther off is not even
 
 
@@ -158,7 +159,7 @@ def turns_with_spin(motion: Motion) -> bool:
         return False
     dt = float(np.median(np.diff(motion.stamps))) / NANOSECONDS
     rate = float(np.median(motion.numbers[:, 12]))
-    if abs(rate * dt) > math.pi or abs(rate) < 1.0:
+    if dt <= 0.0 or abs(rate * dt) > math.pi or abs(rate) < 1.0:
         return False
     rotation = _rotation(motion)
     seen = float(np.median((rotation[:-1].inv() * rotation[1:]).as_rotvec()[:, 2])) / dt
@@ -171,5 +172,7 @@ def greatest_speed(motion: Motion) -> float:
 
 
 def _rotation(motion: Motion) -> Rotation:
-    norm = np.linalg.norm(motion.quaternion, axis=1, keepdims=True)
-    return Rotation.from_quat(np.where(norm > 0.0, motion.quaternion, (0.0, 0.0, 0.0, 1.0)))
+    with np.errstate(over='ignore'):
+        norm = np.linalg.norm(motion.quaternion, axis=1, keepdims=True)
+    usable = (norm > _SHORTEST) & (norm < 1.0 / _SHORTEST)  # a damaged one may have any length
+    return Rotation.from_quat(np.where(usable, motion.quaternion, (0.0, 0.0, 0.0, 1.0)))

@@ -24,6 +24,7 @@ COMPONENTS = (
 )  # of an Odometry, in the order of `Motion.numbers`
 _STAMP = slice(4, 12)
 _PREFIX = 12  # bytes of encapsulation and stamp
+_LATEST = 2**63 - 1  # ns; a damaged log time may be later
 _STRINGS = {ODOMETRY: 2, POSE: 1}
 _TWIST_AT = 7 + 36  # doubles: pose, its covariance
 _DOUBLES = {ODOMETRY: _TWIST_AT + 6, POSE: 7}
@@ -155,7 +156,7 @@ def _motion(
     return Motion(
         *key,
         stamps=stamps['sec'].astype(np.int64) * 1_000_000_000 + stamps['nanosec'],
-        log=np.array([m.log_time for m in group], dtype=np.int64),
+        log=np.array([min(m.log_time, _LATEST) for m in group], dtype=np.int64),
         numbers=np.hstack(parts).astype(float),
     )
 

@@ -186,7 +186,10 @@ def discs(bag: Bag, topic: str | None = None) -> list[Disc]:
     told: dict[str, list[Message]] = {}
     for message in bag.messages([name for name, info in known.items() if info.message_count]):
         told.setdefault(message.topic, []).append(message)
-    return [_disc(motion, found, _Told(told), set(known)) for motion in found]
+    try:
+        return [_disc(motion, found, _Told(told), set(known)) for motion in found]
+    except (AttributeError, TypeError, ValueError) as error:  # by a damaged definition
+        raise BagError(f'{bag.path}: a message is not what its topic says ({error})') from None
 
 
 def _moving_topics(bag: Bag, topic: str | None) -> dict[str, str]:

@@ -10,7 +10,7 @@ import numpy as np
 from disc_sim_ros import __version__
 from disc_sim_ros.analysis.motion import COMPONENTS, message_numbers
 from disc_sim_ros.analysis.recording import APPLIED, NANOSECONDS, Change, Flight
-from disc_sim_ros.core import axes, catalogue
+from disc_sim_ros.core import axes, catalogue, check
 from disc_sim_ros.core.air import Air, Wind
 from disc_sim_ros.core.disc import FloatArray
 from disc_sim_ros.core.equations import DISC, DISC_AIR, DISC_BODY, State
@@ -91,10 +91,18 @@ def setup_of(configuration: Mapping[str, Any]) -> Setup:
             wind=Wind(mean=mean, **wind),
             step=1.0 / float(told['physics_rate']),
         )
-    except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
-        if isinstance(error, ConfigError):
-            raise
-        raise ConfigError('configuration', str(error), 'it is not one of sim_node') from None
+    except _NOT_ONE as error:
+        raise _refused(error) from None
+
+
+_NOT_ONE = (KeyError, TypeError, ValueError, ZeroDivisionError, OverflowError)
+
+
+def _refused(error: Exception) -> ConfigError:
+    """Return the error of a configuration that cannot be flown, for what reading it raised."""
+    if isinstance(error, ConfigError):
+        return error
+    return ConfigError('configuration', str(error), 'it is not one of sim_node')
 
 
 def fly_again(flight: Flight) -> Reflight:
@@ -107,9 +115,14 @@ def fly_again(flight: Flight) -> Reflight:
         raise DiscSimError('the bag has no configuration of this flight')
     told = flight.release.configuration
     setup = setup_of(told)
-    rate = float(told['physics_rate'])
-    release = State(*(float(told['release'][name]) for name in State._fields))
-    sim = FlightSimulator(setup, release, ground=bool(told['ground']))
+    try:
+        rate = float(told['physics_rate'])
+        check.number('publish_rate', told['publish_rate'], above=0.0, unit='Hz')
+        release = State(*(float(told['release'][name]) for name in State._fields))
+        ground = bool(told['ground'])
+    except _NOT_ONE as error:
+        raise _refused(error) from None
+    sim = FlightSimulator(setup, release, ground=ground)
     stamps = flight.motion.stamps
     steps = np.rint((stamps - flight.start) * rate / NANOSECONDS).astype(np.int64)
     off = np.abs(steps * NANOSECONDS / rate - (stamps - flight.start)) > _ROUNDED
@@ -149,7 +162,7 @@ def compare(flight: Flight, again: Reflight, bag_doubts: tuple[str, ...] = ()) -
     for name in _LANDING:
         told = flight.landing.values.get(name) if flight.landing else None
         if told is not None:
-            largest[f'landed.{name}'] = abs(float(told) - again.landing.get(name, np.inf))
+            largest[f'landed.{name}'] = _apart(told, again.landing.get(name, np.inf))
     differing = np.flatnonzero(~same)
     return Verdict(
         compared=len(recorded),
@@ -158,6 +171,14 @@ def compare(flight: Flight, again: Reflight, bag_doubts: tuple[str, ...] = ()) -
         first=float(flight.time[differing[0]]) if len(differing) else None,
         doubts=(*bag_doubts, *_doubts(flight, again)),
     )
+
+
+def _apart(told: str, flown: float) -> float:
+    """Return the difference of a number that a message tells; infinite of what is no number."""
+    try:
+        return abs(float(told) - flown)
+    except ValueError:
+        return math.inf
 
 
 def _doubts(flight: Flight, again: Reflight) -> list[str]:

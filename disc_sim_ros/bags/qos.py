@@ -8,6 +8,8 @@ import yaml
 
 from disc_sim_ros.bags.errors import BagError
 
+# The C one is many times faster; not every build of PyYAML has it.
+LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 INFINITE = 9223372036854775807  # ns: 9223372036 s and 854775807 ns, rmw's RMW_DURATION_INFINITE
 _SECOND = 1_000_000_000  # ns
 _FOXY_INFINITE = ((2147483647, 4294967295), (2147483647, 2147483647))  # sec, nsec in old bags
@@ -66,7 +68,7 @@ def parse(text: str) -> tuple[Qos, ...]:
         BagError: It is no such list.
     """
     try:
-        return from_items(yaml.safe_load(text) or [])
+        return from_items(yaml.load(text, Loader=LOADER) or [])  # noqa: S506 - a safe one
     except yaml.YAMLError as error:
         raise BagError(f'QoS is no YAML ({" ".join(str(error).split())})') from None
 

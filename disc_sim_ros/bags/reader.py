@@ -29,6 +29,7 @@ from disc_sim_ros.bags.index import indexed
 from disc_sim_ros.bags.metadata import BagMetadata, TopicInfo
 from disc_sim_ros.bags.scan import scanned
 from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.core.errors import brief
 
 _NUMBER = re.compile(r'_(\d+)\.mcap$')
 _OTHERS = (  # how files that are no MCAP begin, and what to do
@@ -367,9 +368,10 @@ def _decoder(contents: Contents, channel_id: int) -> tuple[str, Callable[[bytes]
         schema = Schema(schema.id, found.encode(), 'ros2msg', schema.name)
     try:
         decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
-    except (ValueError, KeyError, McapError) as error:
-        raise BagError(f'{where}: the definition of {schema.name} is not understood ({error})'
-                       ) from None  # fmt: skip
+    except Exception as error:  # the parser raises whatever it stumbles over
+        raise BagError(
+            f'{where}: the definition of {schema.name} is not understood ({brief(str(error))})'
+        ) from None
     if decode is None:
         raise BagError(
             f'{where}: messages in {channel.message_encoding!r} with definitions in '

@@ -21,6 +21,7 @@ import numba
 F = TypeVar('F', bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'nogil': True}
+COMPILED = not numba.config.DISABLE_JIT
 _NEEDED = 20 << 20  # bytes of free space; the machine code is about 2 MB
 _KEEP_UNUSED_S = 30 * 86400.0  # caches of older sources go after a month without use
 
@@ -37,7 +38,7 @@ def jit(function: F) -> F:
 
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep the machine code on disk."""
-    if numba.config.DISABLE_JIT:
+    if not COMPILED:
         return function
     folder = _cache_folder()
     if folder is None:

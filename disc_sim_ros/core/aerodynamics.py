@@ -1,10 +1,10 @@
 """Steady aerodynamic coefficients, eqns 19 to 21 and Fig. 3: scalar functions, compiled."""
 
-import math
 from typing import NamedTuple
 
 from disc_sim_ros.core._jit import inline
 from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.core.lanes import any_of, at, floor, table_row, where
 
 
 class Linear(NamedTuple):
@@ -36,21 +36,18 @@ def table_coefficients(alpha: float, table: FloatArray) -> tuple[float, float, f
 
     Args:
         alpha: Angle of attack [rad].
-        table: Columns alpha [rad], C_Lift, C_Drag, C_M; shape (n, 4). It covers every angle.
+        table: See `disc.Disc.table_rows`. It covers every angle.
     """
-    last = len(table) - 2
-    share = (alpha - table[0, 0]) / (table[last + 1, 0] - table[0, 0])
-    i = min(max(int(share * (last + 1)), 0), last)  # right at once if the rows are even
-    while i > 0 and alpha < table[i, 0]:
-        i -= 1
-    while i < last and alpha >= table[i + 1, 0]:
-        i += 1
-    f = (alpha - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
-    return (
-        table[i, 1] + f * (table[i + 1, 1] - table[i, 1]),
-        table[i, 2] + f * (table[i + 1, 2] - table[i, 2]),
-        table[i, 3] + f * (table[i + 1, 3] - table[i, 3]),
-    )
+    last = len(table) - 2.0
+    rows_per_rad = (last + 1.0) / (table[len(table) - 1, 0] - table[0, 0])
+    share = (alpha - table[0, 0]) * rows_per_rad
+    i = floor(min(max(0.0, share), last))  # right at once if the rows are even
+    low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha = table_row(table, i)
+    while any_of(((alpha < low) & (i > 0.0)) | ((alpha >= high) & (i < last))):
+        i = where(alpha < low, max(i - 1.0, 0.0), where(alpha >= high, min(i + 1.0, last), i))
+        low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha = table_row(table, i)
+    d_alpha = alpha - low
+    return CL + CL_alpha * d_alpha, CD + CD_alpha * d_alpha, CM + CM_alpha * d_alpha
 
 
 @inline
@@ -69,24 +66,27 @@ def spin_coefficients(
     """
     i, f = _place(abs(advance_ratio), terms[0, 1:, 0])
     j, g = _place(alpha, terms[0, 0, 1:])
-    sign = math.copysign(1.0, advance_ratio)
+    sign = where(advance_ratio < 0.0, -1.0, 1.0)
     C_L = sign * _bilinear(terms[0, 1:, 1:], i, f, j, g)
     C_Side = sign * _bilinear(terms[1, 1:, 1:], i, f, j, g)
     return C_L, C_Side
 
 
 @inline
-def _bilinear(C: FloatArray, i: int, f: float, j: int, g: float) -> float:
-    low: float = C[i, j] + g * (C[i, j + 1] - C[i, j])
-    high: float = C[i + 1, j] + g * (C[i + 1, j + 1] - C[i + 1, j])
+def _bilinear(C: FloatArray, i: float, f: float, j: float, g: float) -> float:
+    low: float = at(C, i, j) + g * (at(C, i, j + 1.0) - at(C, i, j))
+    high: float = at(C, i + 1.0, j) + g * (at(C, i + 1.0, j + 1.0) - at(C, i + 1.0, j))
     return low + f * (high - low)
 
 
 @inline
-def _place(x: float, grid: FloatArray) -> tuple[int, float]:
+def _place(x: float, grid: FloatArray) -> tuple[float, float]:
     """Return the cell of `grid` that holds `x` and how far in it is, 0 to 1 outside too."""
-    i = 0
-    while i < len(grid) - 2 and x >= grid[i + 1]:
-        i += 1
-    f = (x - grid[i]) / (grid[i + 1] - grid[i])
+    i, low, high = 0.0, grid[0], grid[1]
+    for k in range(1, len(grid) - 1):
+        beyond = x >= grid[k]
+        i = where(beyond, float(k), i)
+        low = where(beyond, grid[k], low)
+        high = where(beyond, grid[k + 1], high)
+    f = (x - low) / (high - low)
     return i, min(max(f, 0.0), 1.0)

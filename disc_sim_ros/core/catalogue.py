@@ -193,7 +193,7 @@ def _disc(name: str, keys: dict[str, Any], source: str) -> Disc:
         for key, attribute in _PROPERTIES.items():
             if key in keys:
                 known[attribute] = check.number(key, keys[key], above=0.0)
-        known.setdefault('area', math.pi * known['diameter'] ** 2 / 4)
+        known.setdefault('area', math.pi * known['diameter'] * known['diameter'] / 4)
         for section, fields in _SECTIONS.items():
             if section in keys:
                 known.update(_section(section, keys[section], fields))

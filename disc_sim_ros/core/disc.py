@@ -178,13 +178,18 @@ class Disc:
 
     @cached_property
     def table_rows(self) -> FloatArray:
-        """Return the table as `aerodynamics.table_coefficients` takes it, shape (n, 4).
+        """Return the table as `aerodynamics.table_coefficients` takes it, shape (n, 8).
 
-        A disc without a table gets two rows that nobody reads.
+        Columns are alpha [rad], C_Lift, C_Drag, C_M, the alpha of the next row, and the slopes of
+        the three coefficients up to there [1/rad]; in the last row nobody reads those. A disc
+        without a table gets rows that nobody reads.
         """
         if self.table is None:
-            return np.array([[-np.pi, 0.0, 0.0, 0.0], [np.pi, 0.0, 0.0, 0.0]])
-        return np.column_stack([self.table.alpha, self.table.coefficients])
+            return np.array([[-np.pi, 0, 0, 0, np.pi, 0, 0, 0], [np.pi, 0, 0, 0, np.inf, 0, 0, 0]])
+        alpha, C = self.table.alpha, self.table.coefficients
+        slopes = np.diff(C, axis=0) / np.diff(alpha)[:, np.newaxis]
+        slopes = np.vstack([slopes, np.zeros(3)])
+        return np.column_stack([alpha, C, np.append(alpha[1:], np.inf), slopes])
 
     @cached_property
     def spin_terms(self) -> FloatArray:

@@ -1,8 +1,8 @@
-"""Many flights at once: `integration.integrate` over arrays of launches, on all cores."""
+"""Many flights at once: those of `flight.fly`, side by side in vector registers, on all cores."""
 
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 import os
 from typing import Any
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from disc_sim_ros.core import axes, check, flight
-from disc_sim_ros.core._jit import is_compiled
+from disc_sim_ros.core._jit import COMPILED, is_compiled
 from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.core.ensemble_lanes import fly_lanes
 from disc_sim_ros.core.ensemble_rows import ALL_LIMITS, AT, NAMES, IntArray, fly_rows
 from disc_sim_ros.core.equations import Control, State
 from disc_sim_ros.core.errors import ConfigError
@@ -22,8 +23,9 @@ from disc_sim_ros.core.launch import LIMITS, Launch
 from disc_sim_ros.core.rk4 import STABLE
 from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS
 
-_CHUNK = 256  # flights that a thread takes at a time: 25 ms, so that Ctrl-C is heard
-_FIRST_GUSTS = 1000  # rows of noise drawn at first, 10 s; nearly every flight has landed by then
+# Flights that a thread takes at a time: for 0.1 s or so, so that Ctrl-C is heard.
+_CHUNK_PER_STEP, _LONGEST_CHUNK = 2e5, 4096  # 1/s
+_FIRST_GUSTS = 500  # rows of noise drawn at first, for 5 s; most flights have landed by then
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,32 +111,36 @@ def fly_many(
             for a flight; it names the first such flight.
     """
     check.number('duration', duration, above=0.0, highest=flight.LONGEST, unit='s')
-    rows = _rows(launches, setup, flight.checked_control(control), ground=ground)
-    n = len(rows)
+    control = flight.checked_control(control)
+    columns = _checked_columns(launches, setup, control, ground=ground)
+    n = max((x.size for x in columns.values() if x.ndim), default=1)
     found = Landings(
         np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty((n, STATE_SIZE))
     )
-    fixed = _Fixed(setup, flight.checked_control(control), float(duration), ground=ground)
     gusts = None
+    chunk = round(min(max(_CHUNK_PER_STEP * setup.step, 8), _LONGEST_CHUNK))
     if setup.wind.turbulence > 0.0:
         gusts = _seeds(setup.wind.seed if seeds is None else seeds, n)
+        chunk = max(chunk // 16, 8)
+    fixed = _Fixed(setup, control, float(duration), ground, found)
 
     def work(start: int) -> None:
-        stop = min(start + _CHUNK, n)
+        rows = _rows(columns, start, min(start + chunk, n))
         if gusts is None:
-            fixed.fly(rows, found, start, stop, flight.NO_NOISE)
+            fixed.fly(rows, start, flight.NO_NOISE)
             return
-        for i in range(start, stop):
-            fixed.fly_in_gusts(rows, found, i, int(gusts[i]))
+        for i, row in enumerate(rows, start):
+            fixed.fly_in_gusts(row[np.newaxis], i, int(gusts[i]))
 
-    workers = min(threads or os.cpu_count() or 1, -(-n // _CHUNK))
+    starts = range(0, n, chunk)
+    workers = min(threads or os.cpu_count() or 1, len(starts))
     if workers <= 1:
-        for start in range(0, n, _CHUNK):
+        for start in starts:
             work(start)
         return found
     pool = ThreadPoolExecutor(workers)
     try:
-        futures: list[Future[None]] = [pool.submit(work, s) for s in range(0, n, _CHUNK)]
+        futures: list[Future[None]] = [pool.submit(work, start) for start in starts]
         for future in futures:
             future.result()
     finally:
@@ -144,7 +150,7 @@ def fly_many(
 
 def is_ready() -> bool:
     """Say whether `fly_many` needs no compilation first."""
-    return is_compiled(fly_rows)
+    return is_compiled(fly_lanes) and is_compiled(fly_rows)
 
 
 @dataclass(frozen=True)
@@ -155,15 +161,15 @@ class _Fixed:
     control: Control
     duration: float
     ground: bool
+    found: Landings
 
-    def fly(
-        self, rows: FloatArray, found: Landings, start: int, stop: int, noise: FloatArray
-    ) -> None:
-        setup = self.setup
-        fly_rows(
+    def fly(self, rows: FloatArray, start: int, noise: FloatArray) -> None:
+        """Fly all rows, the first of which is flight `start`: side by side if without gusts."""
+        setup, found = self.setup, self.found
+        together = len(noise) == 0 and COMPILED
+        (fly_lanes if together else fly_rows)(
             rows,
             start,
-            stop,
             setup.plant,
             setup.disc.table_rows,
             setup.disc.spin_terms,
@@ -180,85 +186,87 @@ class _Fixed:
             found.states,
         )
 
-    def fly_in_gusts(self, rows: FloatArray, found: Landings, i: int, seed: int) -> None:
+    def fly_in_gusts(self, row: FloatArray, i: int, seed: int) -> None:
         """Fly one; draw more of the same numbers where it is in the air for long."""
         needed = math.ceil(self.duration / GUST_INTERVAL) + 3
-        for count in (min(_FIRST_GUSTS, needed), needed):
+        for count in (min(_FIRST_GUSTS, needed), min(4 * _FIRST_GUSTS, needed), needed):
             generator = np.random.Generator(np.random.Philox(seed))
             noise = generator.standard_normal((count, NOISE_COLUMNS))
             duration = min(self.duration, (count - 3) * GUST_INTERVAL)
-            _Fixed(self.setup, self.control, duration, self.ground).fly(
-                rows, found, i, i + 1, noise
-            )
-            if found.status[i] != FLYING or count == needed:
+            replace(self, duration=duration).fly(row, i, noise)
+            if self.found.status[i] != FLYING or count == needed:
                 return
 
 
-def _rows(
+def _checked_columns(
     launches: Mapping[str, ArrayLike], setup: Setup, control: Control, *, ground: bool
-) -> FloatArray:
-    """Return the columns of NAMES for all flights, checked, shape (n, len(NAMES))."""
-    for name in launches:
+) -> dict[str, FloatArray]:
+    """Return all of NAMES, checked: what is given, of shape (n,) or (), and what is not."""
+    columns = {name: np.array(x) for name, x in _defaults(setup, control).items()}
+    for name, values in launches.items():
         check.choice('launches', name, NAMES)
-    given = {name: np.asarray(x, dtype=float) for name, x in launches.items()}
-    sizes = {name: x.size for name, x in given.items() if x.ndim}
-    n = max(sizes.values(), default=1)
-    for name, x in given.items():
+        try:
+            columns[name] = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise ConfigError(name, values, 'give numbers') from None
+    n = max((x.size for x in columns.values() if x.ndim), default=1)
+    for name, x in columns.items():
         if x.ndim > 1 or (x.ndim == 1 and x.size != n):
             raise ConfigError(name, x.shape, f'give a number or an array of shape ({n},)')
-    defaults = _defaults(setup, control)
-    rows = np.empty((n, len(NAMES)))
-    for j, name in enumerate(NAMES):
-        rows[:, j] = given.get(name, defaults[name])
-    lowest, highest, _ = zip(*ALL_LIMITS.values(), strict=True)
-    for name in given:
-        j = AT[name]
-        _refuse(name, rows[:, j], (rows[:, j] >= lowest[j]) & (rows[:, j] <= highest[j]))
+    for name in launches:
+        lowest, highest, unit = ALL_LIMITS[name]
+        x = columns[name]
+        allowed = f'give a number from {lowest:g} to {highest:g} {unit}'.rstrip()
+        _refuse(name, x, (x >= lowest) & (x <= highest), allowed)
     if ground:
-        _refuse(
-            'height',
-            rows[:, AT['height']],
-            rows[:, AT['height']] >= 0.0,
-            'release at 0 m or above',
-        )
-    axial, most = rows[:, AT['inertia_axial']], 2.0 * rows[:, AT['inertia_diametral']]
-    _refuse('inertia_axial', axial, axial <= most, 'at most twice inertia_diametral')
-    _refuse_long_steps(rows, setup)
+        _refuse('height', columns['height'], columns['height'] >= 0.0, 'release at 0 m or above')
+    axial, most = columns['inertia_axial'], 2.0 * columns['inertia_diametral']
+    axial = np.broadcast_to(axial, np.broadcast_shapes(axial.shape, most.shape))
+    _refuse('inertia_axial', axial, axial <= most * (1 + 1e-9), 'at most twice inertia_diametral')
+    for start in range(0, n, _LONGEST_CHUNK):
+        _refuse_long_steps(_rows(columns, start, min(start + _LONGEST_CHUNK, n)), start, setup)
+    return columns
+
+
+def _rows(columns: dict[str, FloatArray], start: int, stop: int) -> FloatArray:
+    """Return the columns of some flights as the compiled loop takes them, (n, len(NAMES))."""
+    rows = np.empty((stop - start, len(NAMES)))
+    for j, name in enumerate(NAMES):
+        x = columns[name]
+        rows[:, j] = x[start:stop] if x.ndim else x
     return rows
 
 
-def _refuse(name: str, values: FloatArray, good: NDArray[np.bool_], allowed: str = '') -> None:
+def _refuse(name: str, values: FloatArray, good: NDArray[np.bool_], allowed: str) -> None:
     if not good.all():
         i = int(np.argmin(good))
-        if not allowed:
-            low, high, unit = ALL_LIMITS[name]
-            allowed = f'give a number from {low:g} to {high:g} {unit}'.rstrip()
-        raise ConfigError(f'{name} of flight {i}', float(values[i]), allowed)
+        raise ConfigError(f'{name} of flight {i}', float(values.flat[i]), allowed)
 
 
-def _refuse_long_steps(rows: FloatArray, setup: Setup) -> None:
+def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
     """Refuse a step that RK4 cannot follow in some flight, as `Setup.check_step` does for one."""
     if setup.model == 'precession':
         return
     of = {name: rows[:, j] for name, j in AT.items()}
-    wind = np.sqrt(of['wind_x'] ** 2 + of['wind_y'] ** 2 + of['wind_z'] ** 2)
-    aero = setup.aero or setup.disc.aero
-    most_damped = min(float(of['C_Lp'].min()), float(of['C_Mq'].min()))
+    spin = of['spin']
+    V = of['speed'] + np.sqrt(of['wind_x'] ** 2 + of['wind_y'] ** 2 + of['wind_z'] ** 2)
     arrays: dict[str, Any] = {
         'I_x': of['inertia_diametral'],
         'I_z': of['inertia_axial'],
         'rho': of['air_density'],
     }
-    plant = setup.plant._replace(C_Lp=most_damped, C_Mq=most_damped, **arrays)
-    steepest = setup.disc.steepest_moment(aero) * float(of['pitching_factor'].max())
-    spin, V = of['spin'], of['speed'] + wind
-    fastest = np.maximum.reduce(flight.rates(spin, V, plant, steepest))
+    plant = setup.plant._replace(C_Lp=-1.0, C_Mq=-1.0, **arrays)
+    steepest = setup.disc.steepest_moment(setup.aero or setup.disc.aero)
+    nutation, damping, pitching = flight.rates(spin, V, plant, steepest)
+    damping = damping * np.maximum(-of['C_Lp'], -of['C_Mq'])
+    pitching = pitching * np.sqrt(of['pitching_factor'])
+    fastest = np.maximum.reduce([nutation, damping, pitching])
     good = setup.step * fastest <= STABLE
     if not good.all():
         i = int(np.argmin(good))
         allowed = (
-            f'flight {i}, at spin {spin[i]:g} rad/s and {V[i]:g} m/s through the air, needs at '
-            f'most {STABLE / fastest[i]:.3g} s'
+            f'flight {start + i}, at spin {spin[i]:g} rad/s and {V[i]:g} m/s through the air, '
+            f'needs at most {STABLE / fastest[i]:.3g} s'
         )
         raise ConfigError('step', setup.step, allowed)
 

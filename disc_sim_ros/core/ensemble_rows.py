@@ -10,7 +10,8 @@ from disc_sim_ros.core._jit import entry, inline, jit
 from disc_sim_ros.core.aerodynamics import Linear
 from disc_sim_ros.core.disc import FloatArray
 from disc_sim_ros.core.equations import Control, Plant, State
-from disc_sim_ros.core.integration import STATE_SIZE, integrate
+from disc_sim_ros.core.integration import STATE_SIZE, Ended, integrate
+from disc_sim_ros.core.lanes import element, where
 from disc_sim_ros.core.launch import LIMITS
 from disc_sim_ros.core.turbulence import WindData
 
@@ -47,6 +48,7 @@ _CONTROL = AT['control_CL']
 _MASS = AT['mass']
 _YAW = AT['yaw']
 _FACTORS = AT['lift_factor']
+_OFFSETS = AT['lift_offset']
 
 _cos_sin_degrees = jit(axes.cos_sin_degrees)
 _quaternion_of_half_angles = inline(axes.quaternion_of_half_angles)
@@ -55,7 +57,7 @@ _rotated = inline(axes.rotated)
 
 
 @jit
-def _release(row: FloatArray) -> State:
+def release(row: FloatArray) -> State:
     """Return `Launch.state` of the first columns of a row."""
     speed, pitch, roll, yaw, alpha, sideslip, spin, roll_rate, pitch_rate, height = row[:10]
     c_alpha, s_alpha = _cos_sin_degrees(alpha)
@@ -85,52 +87,96 @@ def _release(row: FloatArray) -> State:
 
 
 @inline
-def _plant_of(row: FloatArray, plant: Plant) -> Plant:
-    """Return the constants of a flight."""
-    m, I_z, I_x, C_Lp, C_Mq, C_Nr, rho, g = row[_MASS : _MASS + 8]
-    f_L, f_D, f_M, o_L, o_D, o_M = row[_FACTORS : _FACTORS + 6]
+def plant_of(row: FloatArray, plant: Plant) -> Plant:
+    """Return the constants of a flight, or of a flight in each lane."""
+    f_L, f_D, f_M = element(row, _FACTORS), element(row, _FACTORS + 1), element(row, _FACTORS + 2)
+    o_L, o_D, o_M = element(row, _OFFSETS), element(row, _OFFSETS + 1), element(row, _OFFSETS + 2)
     line = plant.line
-    line = Linear(
-        line.CL_0 * f_L + o_L,
-        line.CL_alpha * f_L,
-        line.CD_0 * f_D + o_D,
-        line.CD_alpha * f_D,
-        line.alpha_0,
-        line.CM_0 * f_M + o_M,
-        line.CM_alpha * f_M,
-    )
     return Plant(
-        m,
+        element(row, _MASS),
         plant.c,
         plant.S,
-        I_x,
-        I_z,
-        C_Lp,
-        C_Mq,
-        C_Nr,
-        rho,
-        g,
+        element(row, _MASS + 2),  # I_x
+        element(row, _MASS + 1),  # I_z
+        element(row, _MASS + 3),
+        element(row, _MASS + 4),
+        element(row, _MASS + 5),
+        element(row, _MASS + 6),  # rho
+        element(row, _MASS + 7),  # g
         plant.model,
         plant.moment_axes,
         plant.use_linear,
-        line,
+        Linear(
+            line.CL_0 * f_L + o_L,
+            line.CL_alpha * f_L,
+            line.CD_0 * f_D + o_D,
+            line.CD_alpha * f_D,
+            line.alpha_0,
+            line.CM_0 * f_M + o_M,
+            line.CM_alpha * f_M,
+        ),
     )
 
 
+@jit
+def fill_table(row: FloatArray, base: FloatArray, table: FloatArray) -> None:
+    """Write the table of a flight, its coefficients scaled and shifted, to `table`."""
+    for j in range(len(base)):
+        table[j, 0] = base[j, 0]
+        table[j, 4] = base[j, 4]
+        for k in range(3):
+            factor, offset = row[_FACTORS + k], row[_OFFSETS + k]
+            table[j, 1 + k] = base[j, 1 + k] * factor + offset
+            table[j, 5 + k] = base[j, 5 + k] * factor
+
+
 @inline
-def _wind_of(row: FloatArray, wind: WindData) -> WindData:
-    """Return the wind of a flight, as `Setup.wind_data` does."""
-    X, Y, Z = row[_WIND], 0.0 - row[_WIND + 1], 0.0 - row[_WIND + 2]
+def control_of(row: FloatArray, c: Control) -> Control:
+    """Return the control inputs of a flight, or of a flight in each lane."""
+    C_L, C_M, C_N = (
+        element(row, _CONTROL),
+        element(row, _CONTROL + 1),
+        element(row, _CONTROL + 2),
+    )
+    return Control(C_L, C_M, C_N, c.L, c.M, c.N, c.axes)
+
+
+@inline
+def wind_of(row: FloatArray, wind: WindData) -> WindData:
+    """Return the wind of a flight, or of a flight in each lane, as `Setup.wind_data` does."""
+    X, Y, Z = element(row, _WIND), 0.0 - element(row, _WIND + 1), 0.0 - element(row, _WIND + 2)
     horizontal = math.sqrt(X * X + Y * Y)
-    x_X, x_Y = (X / horizontal, Y / horizontal) if horizontal > 0.0 else (1.0, 0.0)
+    still = horizontal <= 0.0
+    h = where(still, 1.0, horizontal)
+    x_X, x_Y = where(still, 1.0, X / h), where(still, 0.0, Y / h)
     return WindData(X, Y, Z, wind.z0, wind.per_log, wind.W_20, x_X, x_Y)
+
+
+@jit
+def write_end(
+    row: FloatArray,
+    ended: Ended,
+    i: int,
+    status: IntArray,
+    time: FloatArray,
+    apex: FloatArray,
+    drift: FloatArray,
+    states: FloatArray,
+) -> None:
+    """Write how flight `i` ended into the arrays of a `Landings`."""
+    status[i] = ended.status
+    time[i] = ended.t
+    apex[i] = 0.0 - ended.apex_Z
+    c_yaw, s_yaw = _cos_sin_degrees(row[_YAW])
+    drift[i] = s_yaw * ended.state.X - c_yaw * ended.state.Y
+    for k in range(STATE_SIZE):
+        states[i, k] = ended.state[k]
 
 
 @entry
 def fly_rows(
     rows: FloatArray,
     start: int,
-    stop: int,
     plant: Plant,
     base_table: FloatArray,
     spin_terms: FloatArray,
@@ -146,27 +192,19 @@ def fly_rows(
     drift: FloatArray,
     states: FloatArray,
 ) -> None:
-    """Fly rows `start` to `stop` and fill the arrays of a `Landings`."""
+    """Fly one row after the other, and fill the arrays of a `Landings` from `start` on."""
     no_samples = np.empty((0, 18))
-    table = base_table.copy()
-    for i in range(start, stop):
+    table = np.empty(base_table.shape)
+    for i in range(len(rows)):
         row = rows[i]
-        for k in range(3):
-            factor, offset = row[_FACTORS + k], row[_FACTORS + 3 + k]
-            for j in range(len(table)):
-                table[j, 1 + k] = base_table[j, 1 + k] * factor + offset
-        c = base_control
-        control = Control(
-            row[_CONTROL], row[_CONTROL + 1], row[_CONTROL + 2], c.L, c.M, c.N, c.axes
-        )
-        s = _release(row)
+        fill_table(row, base_table, table)
         ended = integrate(
-            s,
-            _plant_of(row, plant),
+            release(row),
+            plant_of(row, plant),
             table,
             spin_terms,
-            control,
-            _wind_of(row, wind),
+            control_of(row, base_control),
+            wind_of(row, wind),
             noise,
             step,
             duration,
@@ -174,10 +212,4 @@ def fly_rows(
             0.0,
             no_samples,
         )
-        status[i] = ended.status
-        time[i] = ended.t
-        apex[i] = 0.0 - ended.apex_Z
-        c_yaw, s_yaw = _cos_sin_degrees(row[_YAW])
-        drift[i] = s_yaw * ended.state.X - c_yaw * ended.state.Y
-        for k in range(STATE_SIZE):
-            states[i, k] = ended.state[k]
+        write_end(row, ended, start + i, status, time, apex, drift, states)

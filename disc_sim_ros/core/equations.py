@@ -20,7 +20,9 @@ from disc_sim_ros.core.aerodynamics import (
     spin_coefficients,
     table_coefficients,
 )
+from disc_sim_ros.core.arctangent import arctangent
 from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.core.lanes import where
 
 EXACT, CONSTANT_SPIN, PRECESSION = range(3)  # rigid-body models
 BODY, WIND = range(2)  # axes in which the moment coefficients act: 3 or 4
@@ -144,7 +146,7 @@ def flow(s: State, wind: Velocity) -> Flow:
     u3 = math.sqrt(u * u + v * v)
     V = math.sqrt(u3 * u3 + w * w)
     per_u3 = 1.0 / max(u3, NO_DIRECTION * V, _TINY)
-    return Flow(u, v, w, u3, V, math.atan2(w, u3), u * per_u3, v * per_u3, 1.0 - u3 * per_u3)
+    return Flow(u, v, w, u3, V, arctangent(w, u3), u * per_u3, v * per_u3, 1.0 - u3 * per_u3)
 
 
 @inline
@@ -242,11 +244,11 @@ def precession_rates(r: float, m: Moment, I_z: float) -> tuple[float, float]:
     """
     H = r * I_z
     det = m.D_xx * m.D_yy + (H - m.D_xy) * (H + m.D_xy)
-    if det <= _TINY:  # neither spin nor damping: nothing sets a rate
-        return 0.0, 0.0
-    p = (-m.D_yy * m.L - (H - m.D_xy) * m.M) / det
-    q = (-m.D_xx * m.M + (H + m.D_xy) * m.L) / det
-    return p, q
+    nothing = det <= _TINY  # neither spin nor damping sets a rate
+    per_det = 1.0 / where(nothing, 1.0, det)
+    p = (-m.D_yy * m.L - (H - m.D_xy) * m.M) * per_det
+    q = (-m.D_xx * m.M + (H + m.D_xy) * m.L) * per_det
+    return where(nothing, 0.0, p), where(nothing, 0.0, q)
 
 
 @inline
@@ -277,17 +279,20 @@ def derivative(
         p, q = precession_rates(r, m, plant.I_z)
     else:
         # Eqn 11 with the axes turning at (p, q, 0) and the angular momentum (I_x p, I_x q, I_z r).
-        p_dot = (m.L + m.D_xx * p + m.D_xy * q - q * r * plant.I_z) / plant.I_x
-        q_dot = (m.M + m.D_xy * p + m.D_yy * q + p * r * plant.I_z) / plant.I_x
+        H = r * plant.I_z
+        per_I_x = 1.0 / plant.I_x
+        p_dot = (m.L + m.D_xx * p + m.D_xy * q - q * H) * per_I_x
+        q_dot = (m.M + m.D_xy * p + m.D_yy * q + p * H) * per_I_x
         if plant.model == EXACT:
             r_dot = m.N / plant.I_z
 
     # Eqns 10 and 33 in earth axes: m dV/dt = T_21 F + m g.
     X, Y, Z = force(a, C, plant)
     xx, xy, xz, yx, yy, yz, zx, zy, zz = _rotation(s.e0, s.e1, s.e2, s.e3)
-    V_X_dot = (xx * X + xy * Y + xz * Z) / plant.m
-    V_Y_dot = (yx * X + yy * Y + yz * Z) / plant.m
-    V_Z_dot = (zx * X + zy * Y + zz * Z) / plant.m + plant.g
+    per_m = 1.0 / plant.m
+    V_X_dot = (xx * X + xy * Y + xz * Z) * per_m
+    V_Y_dot = (yx * X + yy * Y + yz * Z) * per_m
+    V_Z_dot = (zx * X + zy * Y + zz * Z) * per_m + plant.g
     return State(
         s.VX,
         s.VY,

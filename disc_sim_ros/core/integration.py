@@ -17,6 +17,7 @@ from disc_sim_ros.core.equations import (
     force,
     moment,
 )
+from disc_sim_ros.core.landing import top, touchdown
 from disc_sim_ros.core.rk4 import between, is_sound, rk4_step
 from disc_sim_ros.core.turbulence import (
     GUST_INTERVAL,
@@ -30,7 +31,6 @@ from disc_sim_ros.core.turbulence import (
 
 FLYING, LANDED, LOST = range(3)  # LOST: beyond the numbers or the rates that a step can follow
 STATE_SIZE = len(State._fields)
-_CROSSING_TOLERANCE = 1e-12  # s; a thousandth of what is promised
 
 
 class Progress(NamedTuple):
@@ -139,12 +139,44 @@ def integrate(
             asked for. A sample inside a step is a shorter step from the same start.
     """
     p = begin(s, plant, table, spin_terms, control, wind, noise)
-    apex_Z = s.Z
-    written = 0
     if len(samples) > 0:
         _write(samples[0], 0.0, p.state, wind_at(s.Z, p.gust, wind))
-        written = 1
-    t = 0.0
+    return go_on(
+        p,
+        s.Z,
+        plant,
+        table,
+        spin_terms,
+        control,
+        wind,
+        noise,
+        step,
+        duration,
+        ground,
+        sample_rate,
+        samples,
+    )
+
+
+@jit
+def go_on(
+    p: Progress,
+    apex_Z: float,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+    wind: WindData,
+    noise: FloatArray,
+    step: float,
+    duration: float,
+    ground: bool,
+    sample_rate: float,
+    samples: FloatArray,
+) -> Ended:
+    """Fly on from `p`, with the apex so far, to the end; see `integrate` for the arguments."""
+    written = min(len(samples), 1)
+    s, t = p.state, p.k * step
     landed = False
     while t < duration and not landed:
         s, g = p.state, p.gust
@@ -160,11 +192,10 @@ def integrate(
             return Ended(LOST, t, s, apex_Z, written)
         landed = ground and next_s.Z > 0.0
         if landed:
-            x = crossing(s, h, next_s.Z, g, next_g, wind, plant, table, spin_terms, control)
-            next_g = between(g, next_g, x / h)
-            next_s = rk4_step(s, x, g, next_g, wind, plant, table, spin_terms, control)
-            h = x
-            next_t = t + x
+            h, next_g, next_s = touchdown(
+                s, h, next_s, g, next_g, wind, plant, table, spin_terms, control
+            )
+            next_t = t + h
 
         while written < len(samples) and written / sample_rate <= next_t + 1e-12:
             x = written / sample_rate - t
@@ -177,52 +208,10 @@ def integrate(
                 _write(samples[written], written / sample_rate, next_s, z_wind)
             written += 1
         if s.VZ < 0.0 <= next_s.VZ:
-            x = h * s.VZ / (s.VZ - next_s.VZ)
-            x_g = between(g, next_g, x / h)
-            top = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
-            apex_Z = min(apex_Z, top.Z)
+            apex_Z = min(apex_Z, top(s, next_s, h))
         apex_Z = min(apex_Z, next_s.Z)
         s, t = next_s, next_t
     return Ended(LANDED if landed else FLYING, t, s, apex_Z, written)
-
-
-@jit
-def crossing(
-    s: State,
-    h: float,
-    Z_h: float,
-    g: Velocity,
-    next_g: Velocity,
-    wind: WindData,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-) -> float:
-    """Return the time at which Z = 0 within a step that ends at Z_h > 0 (false position).
-
-    A release on the ground is not a landing if the disc rises first: then the way back counts.
-    """
-    a, Z_a = 0.0, s.Z
-    b, Z_b = h, Z_h
-    if Z_a >= 0.0:
-        a = 1e-6 * h
-        a_g = between(g, next_g, a / h)
-        Z_a = rk4_step(s, a, g, a_g, wind, plant, table, spin_terms, control).Z
-        if Z_a >= 0.0:
-            return 0.0
-    for _ in range(100):
-        x = b - Z_b * (b - a) / (Z_b - Z_a)
-        x_g = between(g, next_g, x / h)
-        Z = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control).Z
-        if Z == 0.0 or abs(b - x) < _CROSSING_TOLERANCE:
-            return x
-        if Z * Z_b < 0.0:
-            a, Z_a = b, Z_b
-        else:
-            Z_a = 0.5 * Z_a  # Illinois: the end that stays counts half
-        b, Z_b = x, Z
-    return b
 
 
 @inline
@@ -293,10 +282,8 @@ def run(
             t = p.k * step
             break
         if ground and after.state.Z > 0.0:
-            Z, next_g = after.state.Z, after.gust
-            x = crossing(s, step, Z, g, next_g, wind, plant, table, spin_terms, control)
-            x_g = between(g, next_g, x / step)
-            s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
+            end, next_g = after.state, after.gust
+            x, _, s = touchdown(s, step, end, g, next_g, wind, plant, table, spin_terms, control)
             for i in range(STATE_SIZE):
                 touch[i] = s[i]
             status = LANDED

@@ -34,14 +34,14 @@ def rk4_step(
 
     See `equations.derivative` for the other arguments.
     """
-    g = gust
-    k = sum_k = derivative(s, wind_at(s.Z, g, wind), plant, table, spin_terms, control)
-    for stage in range(1, 4):
-        a = 1.0 if stage == 3 else 0.5
+    x, g = s, gust
+    sum_k = moved(s, -1.0, s)  # zeros
+    for stage in range(4):  # one loop: the equations are compiled into one place
+        k = derivative(x, wind_at(x.Z, g, wind), plant, table, spin_terms, control)
+        sum_k = moved(sum_k, 2.0 if 0 < stage < 3 else 1.0, k)
+        a = 0.5 if stage < 2 else 1.0
         g = between(gust, next_gust, a)
         x = moved(s, a * h, k)
-        k = derivative(x, wind_at(x.Z, g, wind), plant, table, spin_terms, control)
-        sum_k = moved(sum_k, 1.0 if stage == 3 else 2.0, k)
     s = moved(s, h / 6.0, sum_k)
     return consistent(s, wind_at(s.Z, next_gust, wind), plant, table, spin_terms, control)
 
@@ -80,4 +80,4 @@ def is_sound(s: State, h: float, plant: Plant) -> bool:
     fastest = max(abs(s.p), abs(s.q), abs(s.r))
     if plant.model != PRECESSION:
         fastest = max(fastest, abs(s.r) * plant.I_z / plant.I_x)
-    return math.isfinite(total + s.sigma) and fastest * h <= STABLE
+    return (abs(total + s.sigma) < math.inf) & (fastest * h <= STABLE)

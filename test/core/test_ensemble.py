@@ -1,12 +1,17 @@
 """Many flights at once are the flights one by one."""
 
+import signal
+import subprocess
+import sys
+import time
+
 import numpy as np
 import pytest
 
 from disc_sim_ros.core import catalogue, ensemble
 from disc_sim_ros.core.air import Air, Wind
 from disc_sim_ros.core.ensemble import fly_many
-from disc_sim_ros.core.equations import Control
+from disc_sim_ros.core.equations import DISC_AIR, DISC_BODY, Control
 from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.integration import FLYING, LANDED, LOST
@@ -63,6 +68,52 @@ def test_each_flight_is_that_of_fly_to_the_last_bit(disc, model, aero, wind):
         position = found.x[i], found.y[i], found.z[i]
         assert position == tuple(expected.position.tolist())
         assert found.range[i] == pytest.approx(expected.range, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'moment_axes': 'wind'},
+        {'wind': Wind(mean=(3.0, 1.0, 0.0), roughness_length=0.05)},
+        {'model': 'precession', 'wind': Wind(mean=(0.0, 0.0, 2.0))},
+        {'air': Air(density=0.0)},
+    ],
+    ids=['wind axes', 'log profile', 'updraught', 'vacuum'],
+)
+@pytest.mark.parametrize('axes', [DISC_BODY, DISC_AIR])
+def test_side_by_side_is_one_by_one_in_seldom_used_setups(changes, axes):
+    setup = Setup(disc=FRISBEE, step=STEP, **changes)
+    control = Control(L=0.002, M=-0.001, N=0.0005, axes=axes)
+    assert_same_bits(launches(20, seed=3), setup, control=control)
+
+
+@pytest.mark.parametrize('n', [1, 7, 8, 9, 33])
+def test_any_number_of_flights_fills_the_lanes(n):
+    assert_same_bits(launches(n, seed=n), Setup(disc=catalogue.load('wraith'), step=STEP))
+
+
+@pytest.mark.parametrize('duration', [0.004, STEP, 0.995, 1.0, 1.0 + 1e-12, 1.234])
+@pytest.mark.parametrize('ground', [True, False])
+def test_the_last_step_is_as_long_as_that_of_fly(duration, ground):
+    thrown = launches(12, seed=4)
+    assert_same_bits(thrown, Setup(disc=FRISBEE, step=STEP), duration=duration, ground=ground)
+
+
+def test_a_release_on_the_ground_downwards_lands_at_once_and_upwards_does_not():
+    thrown = {'height': np.zeros(3), 'pitch': np.array([-20.0, 0.0, 20.0])}
+    setup = Setup(disc=FRISBEE, step=STEP)
+    assert_same_bits(thrown, setup)
+    assert fly_many(thrown, setup).time[0] == 0.0
+    assert fly_many(thrown, setup).time[2] > 1.0
+
+
+def assert_same_bits(thrown, setup, **more):
+    found = fly_many(thrown, setup, **more)
+    for i, state in enumerate(found.states):
+        expected = one(thrown, i, setup, **more)
+        assert tuple(state.tolist()) == expected.end
+        assert (found.time[i], found.apex[i]) == (expected.time, expected.apex)
+        assert found.status[i] == (LANDED if expected.landed else FLYING)
 
 
 def test_seeds_are_those_of_the_gusts():
@@ -195,9 +246,43 @@ def test_what_is_not_named_is_the_default_and_one_flight_needs_no_array():
         ({'height': [0.0, -1.0]}, 'height of flight 1'),
         ({'spin': [0.0, 900.0]}, 'flight 1'),
         ({'mass': 0.0}, 'mass of flight 0'),
+        ({'speed': 'fast'}, 'speed'),
         ({'inertia_axial': [2.4e-3, 2.9e-3]}, 'inertia_axial of flight 1'),
     ],
 )
 def test_bad_input_names_the_flight(thrown, says):
     with pytest.raises(ConfigError, match=says):
         fly_many(thrown, Setup(disc=FRISBEE, step=STEP))
+
+
+def test_one_wild_flight_is_refused_for_itself_and_not_for_another():
+    """The rate of damping is in proportion to the airspeed: only in fast flight it is too much."""
+    setup = Setup(disc=FRISBEE, step=0.02)
+    thrown = {'C_Lp': [-0.6, -10.0], 'speed': [20.0, 1.0]}
+    found = fly_many(thrown, setup)
+    assert found.status.tolist() == [LANDED, LANDED]
+    with pytest.raises(ConfigError, match='flight 1'):
+        fly_many({'C_Lp': [-0.6, -10.0], 'speed': [1.0, 20.0]}, setup)
+
+
+def test_an_interrupt_stops_it_soon():
+    program = (
+        'from disc_sim_ros.core import catalogue\n'
+        'from disc_sim_ros.core.ensemble import fly_many\n'
+        'from disc_sim_ros.core.flight import Setup\n'
+        'setup = Setup(disc=catalogue.load("frisbee"), step=1e-3)\n'
+        'fly_many({}, setup)\n'
+        'print("ready", flush=True)\n'
+        'fly_many({"pitch": [15.0] * 1_000_000}, setup)\n'
+    )
+    with subprocess.Popen(
+        [sys.executable, '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as flown:
+        assert flown.stdout.readline() == 'ready\n'
+        time.sleep(0.5)  # into the flights, which take minutes
+        flown.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        _, errors = flown.communicate(timeout=30.0)
+        # A chunk is 0.1 s or so of one core; the rest of the bound is for a busy machine.
+        assert time.monotonic() - start < 5.0
+    assert 'KeyboardInterrupt' in errors

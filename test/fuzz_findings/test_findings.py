@@ -1,0 +1,176 @@
+"""What benchmarks/fuzz found, each as small as it gets: refused in one line, never a traceback."""
+
+from dataclasses import replace
+import json
+import math
+import struct
+
+from analysis import bags as flight_bags
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from disc_sim_ros.analysis import kinematics, recording, refly
+from disc_sim_ros.analysis.motion import Motion, motions
+from disc_sim_ros.bags import schemas
+from disc_sim_ros.bags.errors import BagError
+from disc_sim_ros.bags.reader import RawMessage, open_bag
+from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.writer import BagWriter
+from disc_sim_ros.cli import analyse_bag
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.errors import ConfigError, DiscSimError
+
+START = 1_700_000_000_000_000_000  # ns
+
+
+@pytest.mark.parametrize('diameter', ['1e200', '1e155'])
+def test_a_disc_whose_area_is_no_number_is_refused(tmp_path, diameter):
+    file = tmp_path / 'huge.yaml'
+    file.write_text(f'based_on: frisbee\ndiameter_m: {diameter}\n')
+    with pytest.raises(ConfigError):
+        catalogue.load(str(file))
+
+
+# The parser of definitions raises something else for each of them.
+DEFINITIONS = (
+    'string',
+    'td msgs/String data',
+    '====string data = 1',
+    'string aat__data',
+    'string data\n' + '=' * 79 + '<\nMSC: x/Y\nfloat64 x',
+    'geometry_msgs/Point p 0',
+    'float64 0%float64 y 0',
+    'string<=',
+    '=',
+)
+
+
+@pytest.mark.parametrize('definition', DEFINITIONS)
+def test_a_definition_that_is_none_is_told_in_one_line(tmp_path, definition):
+    with BagWriter(tmp_path / 'bag') as writer:
+        told = Topic(name='/a', type='std_msgs/msg/String', definition=definition)
+        topic = writer.add(told)
+        writer.write(topic, b'\x00\x01\x00\x00\x03\x00\x00\x00hi\x00', START, START)
+    with pytest.raises(BagError, match='/a') as refused:
+        list(open_bag(tmp_path / 'bag').messages())
+    assert '\n' not in str(refused.value)
+
+
+def odometry(log_time, number=0.0):
+    """The bytes of an Odometry in `map` of `disc`, with one number in all doubles."""
+    text = struct.pack('<I4sI5s', 4, b'map\0', 5, b'disc\0')
+    text += bytes(-len(text) % 8)  # alignment counts from behind the encapsulation, as 8 + text
+    data = b'\x00\x01\x00\x00' + bytes(8) + text + struct.pack('<85d', *[number] * 85)
+    return RawMessage('/odom', log_time, 0, data)
+
+
+def test_a_log_time_of_64_bits_is_read():
+    """MCAP counts to 2^64 ns, arrays of numpy to 2^63."""
+    (motion,) = motions([odometry(2**64 - 1, 7.0)], 'nav_msgs/msg/Odometry')
+    assert motion.log.tolist() == [2**63 - 1]
+    assert motion.numbers[0].tolist() == [7.0] * 13
+
+
+def motion_with(quaternions, stamps):
+    n = len(stamps)
+    numbers = np.zeros((n, 13))
+    numbers[:, 3:7] = quaternions
+    numbers[:, 12] = 30.0
+    stamps = np.array(stamps, dtype=np.int64)
+    return Motion('/odom', 'map', 'disc', stamps, stamps, numbers)
+
+
+def test_stamps_that_stand_still_tell_of_no_spin():
+    still = motion_with([(0.0, 0.0, 0.0, 1.0)] * 3, [START] * 3)
+    assert not kinematics.turns_with_spin(still)
+
+
+@pytest.mark.parametrize('length', [0.0, 1e-200, 5e-324, 1e200, math.inf, math.nan])
+def test_a_quaternion_of_any_length_is_no_crash(length):
+    quaternions = [(0.0, 0.0, 0.0, 1.0), (length, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, length)]
+    odd = motion_with(quaternions, [START, START + 10_000_000, START + 20_000_000])
+    assert isinstance(kinematics.turns_with_spin(odd), bool)
+
+
+@pytest.fixture(scope='module')
+def steered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('found') / 'bag'
+    return flight_bags.steered_bag(folder, publish_rate=20.0, physics_rate=1000.0)
+
+
+def flight_of(folder):
+    from disc_sim_ros.analysis import flights
+
+    (disc,) = recording.discs(open_bag(folder))
+    return flights.flights(disc)[0]
+
+
+def reconfigured(flight, **changes):
+    """The flight, with another configuration; a change to None takes the key out."""
+    document = {**flight.release.configuration, **changes}
+    document = {key: value for key, value in document.items() if value is not None}
+    return replace(flight, release=replace(flight.release, configuration=document))
+
+
+@pytest.mark.parametrize('key', ['publish_rate', 'physics_rate', 'ground', 'wind', 'disc_file'])
+def test_a_configuration_that_lacks_something_is_refused(steered, key):
+    flight = flight_of(steered)
+    refly.compare(flight, refly.fly_again(flight))  # whole it is one
+    with pytest.raises(DiscSimError):
+        refly.fly_again(reconfigured(flight, **{key: None}))
+
+
+@pytest.mark.parametrize('key', ['publish_rate', 'physics_rate'])
+@pytest.mark.parametrize('value', [0, -1.0, '\0', 'fast', 10**400, math.nan, [], {}])
+def test_a_rate_that_is_none_is_refused(steered, key, value):
+    with pytest.raises(DiscSimError) as refused:
+        refly.fly_again(reconfigured(flight_of(steered), **{key: value}))
+    assert '\n' not in str(refused.value)
+
+
+@pytest.mark.parametrize('value', [10**400, 'far', None])
+def test_a_release_that_is_no_state_is_refused(steered, value):
+    flight = flight_of(steered)
+    release = {**flight.release.configuration['release'], 'X': value}
+    with pytest.raises(DiscSimError):
+        refly.fly_again(reconfigured(flight, release=release))
+
+
+def test_a_landing_that_tells_no_number_differs(steered):
+    flight = flight_of(steered)
+    values = {**flight.landing.values, 'range_m': 'far'}
+    changed = replace(flight, landing=replace(flight.landing, values=values))
+    verdict = refly.compare(changed, refly.fly_again(changed))
+    assert verdict.largest['landed.range_m'] == math.inf
+    assert not verdict.exact
+
+
+def test_the_bag_that_was_changed_is_still_analysed(steered, capsys):
+    """The flights above are of a bag that `analyse_bag` finds exact."""
+    assert analyse_bag.main([str(steered), '--verify', '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['discs']
+
+
+@pytest.mark.parametrize(
+    ('topic', 'kind', 'definition'),
+    [
+        ('/applied_wind', 'geometry_msgs/msg/Vector3Stamped', 'float64 x'),
+        ('/applied_moment', 'geometry_msgs/msg/WrenchStamped', 'float64 wrench'),
+        ('/flight_events', 'diagnostic_msgs/msg/DiagnosticStatus', 'bool name'),
+        ('/release', 'nav_msgs/msg/Odometry', 'int32 header'),
+    ],
+)
+def test_a_message_that_lacks_its_fields_is_told(tmp_path, topic, kind, definition):
+    """By a damaged definition: the name of the type still fits."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        motion = 'nav_msgs/msg/Odometry'
+        odom = writer.add(
+            Topic(name='/odom', type=motion, definition=schemas.definition(motion) or '')
+        )
+        other = writer.add(Topic(name=topic, type=kind, definition=definition))
+        writer.write(odom, odometry(START).data, START, START)
+        writer.write(other, b'\x00\x01\x00\x00' + bytes(16), START, START)
+    with pytest.raises(BagError, match='not what its topic says'):
+        recording.discs(open_bag(tmp_path / 'bag'))
