@@ -83,6 +83,7 @@ setup(
         'numba>=0.60,<1',
         'PyYAML>=6.0,<7',
         'matplotlib>=3.8,<4',
+        'llvmlite>=0.43,<1',
         'lz4>=4.3,<5',
         'mcap>=1.2,<2',
         'mcap-ros2-support>=0.5.5,<1',

@@ -51,9 +51,7 @@ def kill(folders: list[Path], life: float) -> None:
     """Write bags and kill the writers some time [s] after their first flush."""
     options = [str(FLUSH_PERIOD), str(RATE), str(10**9)]
     children = [
-        subprocess.Popen(  # noqa: S603 - our own file
-            [sys.executable, CHILD, folder, *options], stdout=subprocess.PIPE
-        )
+        subprocess.Popen([sys.executable, CHILD, folder, *options], stdout=subprocess.PIPE)
         for folder in folders
     ]
     for child in children:

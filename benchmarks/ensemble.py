@@ -79,7 +79,8 @@ def main() -> None:
     setup = Setup(disc=disc, step=step)
     plain, plain_error = numpy_rate(setup, references)
     print(f'plain numpy at {step * 1e3:g} ms: {plain:.0f} flights/CPU-s, Fig. 5 ending '
-          f'{plain_error * 1e3:.3f} mm off; fly_many is {alone / plain:.1f} times as fast')  # fmt: skip
+          f'{plain_error * 1e3:.3f} mm off; fly_many is {alone / plain:.1f} times as fast'
+          )  # fmt: skip
     print(f' flights        s   flights/s   peak memory, MB   (in batches of {BATCH})')
     count = 1000
     while count <= largest:

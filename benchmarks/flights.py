@@ -91,7 +91,7 @@ def landing_of_reference(launch: Launch) -> list[float]:
 def plain_python_time() -> float:
     """Return the CPU seconds of one flight without numba, measured in a process of its own."""
     environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
-    done = subprocess.run(  # noqa: S603 - this very file
+    done = subprocess.run(
         [sys.executable, __file__], env=environment, capture_output=True, text=True, check=True
     )
     return float(done.stdout)

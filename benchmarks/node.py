@@ -139,7 +139,7 @@ def started(
     command = [sys.executable, '-m', 'disc_sim_ros.nodes.sim_node', '--ros-args']
     for parameter in parameters:
         command += ['-p', parameter]
-    with ended(subprocess.Popen(command, env={**os.environ, **environment})) as process:  # noqa: S603
+    with ended(subprocess.Popen(command, env={**os.environ, **environment})) as process:
         yield process
 
 
@@ -147,7 +147,7 @@ def started(
 def role(*words: str) -> Iterator[subprocess.Popen]:
     """Run this file in another role."""
     command = [sys.executable, __file__, *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)  # noqa: S603
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     with ended(process):
         yield process
 

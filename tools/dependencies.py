@@ -31,6 +31,7 @@ WHY = {
     'dask': 'ensembles on many machines, `sweep --executor dask`',
     'distributed': 'the same',
     'hypothesis': 'property-based tests',
+    'llvmlite': 'lanes of SIMD for numba, which brings it',
     'packaging': 'a test compares the lock file with the bounds',
     'import-linter': 'holds the direction of imports',
     'lz4': 'bags with lz4 chunks',

@@ -1,5 +1,7 @@
 """The one door to numba: everything that is compiled is compiled through here.
 
+(What numba has to know of `lanes` stands in `_vectors`.)
+
 With NUMBA_DISABLE_JIT=1 both decorators return the plain Python function.
 
 Numba keys its cache on the file of the outermost function alone, so that a change of the

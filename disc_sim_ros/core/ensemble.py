@@ -19,12 +19,15 @@ from disc_sim_ros.core.equations import Control, State
 from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.core.flight import Setup
 from disc_sim_ros.core.integration import FLYING, LANDED, STATE_SIZE
+from disc_sim_ros.core.lanes import WIDTH
 from disc_sim_ros.core.launch import LIMITS, Launch
 from disc_sim_ros.core.rk4 import STABLE
 from disc_sim_ros.core.turbulence import GUST_INTERVAL, NOISE_COLUMNS
 
 # Flights that a thread takes at a time: for 0.1 s or so, so that Ctrl-C is heard.
-_CHUNK_PER_STEP, _LONGEST_CHUNK = 2e5, 4096  # 1/s
+_CHUNK = 2e6  # steps
+_USUAL_FLIGHT = 10.0  # s; most are shorter
+_LONGEST_CHUNK = 4096  # flights
 _FIRST_GUSTS = 500  # rows of noise drawn at first, for 5 s; most flights have landed by then
 
 
@@ -118,10 +121,11 @@ def fly_many(
         np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty((n, STATE_SIZE))
     )
     gusts = None
-    chunk = round(min(max(_CHUNK_PER_STEP * setup.step, 8), _LONGEST_CHUNK))
+    seconds = min(duration, _USUAL_FLIGHT) if ground else duration
+    chunk = round(min(max(_CHUNK * setup.step / seconds, WIDTH), _LONGEST_CHUNK))
     if setup.wind.turbulence > 0.0:
         gusts = _seeds(setup.wind.seed if seeds is None else seeds, n)
-        chunk = max(chunk // 16, 8)
+        chunk = max(chunk // 16, 1)
     fixed = _Fixed(setup, control, float(duration), ground, found)
 
     def work(start: int) -> None:

@@ -5,8 +5,9 @@ spin does not limit the step: they are the paper's body axes turned back about z
 sigma, and their own angular velocity is (p, q, 0). Position and velocity are in earth axes 1. What
 is corrected against the printed equations, and why, stands in docs/deviations.md.
 
-Scalar functions: numba compiles them for the node, the offline flight and the ensemble alike, and
-they run as plain Python with NUMBA_DISABLE_JIT=1.
+Functions of floats, or of `lanes`, which hold a float for each of several flights: numba compiles
+them for the node, the offline flight and the ensemble alike, and they run as plain Python with
+NUMBA_DISABLE_JIT=1. Of what differs between flights nothing is asked with `if`.
 """
 
 import math

@@ -3,7 +3,7 @@
 Compiled functions take lanes, vectors of WIDTH floats, wherever they take a float: `+ - * /`,
 comparisons, `min`, `max`, `abs`, `math.sqrt` and the functions below act on all lanes at once,
 each lane rounded as that float alone would be. So both give the same bits. What does not act on
-lanes is `if`: in its place stand `where` and, for a flight that is seldom needed, `any_of`.
+lanes is `if`: in its place stands `where` and, around what is seldom needed, `if any_of(...)`.
 """
 
 import math

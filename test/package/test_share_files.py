@@ -415,6 +415,7 @@ KEYS |= {
     name: f'python3-{name}'
     for name in (
         'distributed',
+        'llvmlite',
         'lz4',
         'matplotlib',
         'numba',
