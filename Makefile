@@ -42,7 +42,7 @@ bench-flights: setup-test ## measure flights per second
 	@$(BIN)/python benchmarks/flights.py
 
 bench: setup-test ## measure flights, ensembles, node, bags and recorder; some minutes, on a quiet machine
-	@for name in flights ensemble node bag_writer bag_killed recorder; do \
+	@for name in flights ensemble peers node bag_writer bag_killed recorder; do \
 		echo "== benchmarks/$$name.py"; $(BIN)/python benchmarks/$$name.py || exit 1; done
 
 fuzz: setup-test ## fuzz every input, 10 minutes each (after .venv/bin/pip install -e .[fuzz])

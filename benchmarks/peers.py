@@ -1,0 +1,97 @@
+"""Flights per CPU-second and error beside other simulators of discs, in one run.
+
+.venv/bin/pip install FrisPy && .venv/bin/python benchmarks/peers.py [seconds of each, 3]
+
+FrisPy comes from PyPI; without it there is a line instead. shotshaper is not on PyPI.
+Each simulator flies its own disc for 3 s in the air, so that errors are against the same simulator
+with a tolerance or a step that is far finer; what they say of the same throw is not compared.
+"""
+
+from collections.abc import Callable
+import math
+import sys
+import time
+
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.flight import Setup, fly
+from disc_sim_ros.core.launch import Launch
+
+SPEED, SPIN, HEIGHT, SECONDS = 15.0, 31.416, 50.0, 3.0  # m/s, rad/s, m, s
+Point = tuple[float, float, float]
+
+
+def rate(flight: Callable[[], Point], seconds: float) -> float:
+    """Return flights per second of CPU time."""
+    flight()
+    count, start = 0, time.process_time()
+    while time.process_time() < start + seconds:
+        flight()
+        count += 1
+    return count / (time.process_time() - start)
+
+
+def ours(step: float, **inertia: float) -> Callable[[], Point]:
+    """Return a flight of this package."""
+    document = catalogue.document(catalogue.load('frisbee')) | inertia
+    setup = Setup(disc=catalogue.from_document('frisbee', document), step=step)
+    launch = Launch(speed=SPEED, spin=SPIN, height=HEIGHT)
+
+    def flown() -> Point:
+        end = fly(launch, setup, duration=SECONDS, ground=False).end
+        return end.X, end.Y, end.Z
+
+    return flown
+
+
+def frispy(inertia: float = 1.0, **solver: float) -> Callable[[], Point]:
+    """Return the same throw by FrisPy, with its moments of inertia times a number.
+
+    Raises:
+        ImportError: It is not installed.
+    """
+    from frispy.disc import Disc  # noqa: PLC0415
+
+    pitch = math.radians(15.0)
+    disc = Disc(
+        z=HEIGHT,
+        vx=SPEED * math.cos(pitch),
+        vz=SPEED * math.sin(pitch),
+        theta=-pitch,
+        dgamma=SPIN,
+        I_xx=0.001219 * inertia,
+        I_zz=0.002352 * inertia,
+    )
+
+    def flown() -> Point:
+        path, _ = disc.compute_trajectory(flight_time=SECONDS, n_times=2, **solver)
+        return float(path['x'][-1]), float(path['y'][-1]), float(path['z'][-1])
+
+    return flown
+
+
+def main() -> None:
+    """Measure and print."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
+    mine = rate(ours(0.02), seconds)
+    error = math.dist(ours(0.02)(), ours(1e-4)())
+    light = {'inertia_axial_kg_m2': 2.4e-3 * 10, 'inertia_diametral_kg_m2': 1.2e-3 * 10}
+    moved = math.dist(ours(0.02, **light)(), ours(0.02)())
+    print(f'disc_sim_ros, 20 ms step: {mine:.0f} flights per CPU-second, {error * 1e3:.3f} mm off')
+    print(f'  ten times the inertia moves the end by {moved:.2f} m')
+    try:
+        theirs = rate(frispy(), seconds)
+    except ImportError:
+        print('FrisPy: not installed (pip install FrisPy), skipped')
+    else:
+        error = math.dist(frispy()(), frispy(rtol=1e-10, atol=1e-10)())
+        moved = math.dist(frispy(inertia=10.0)(), frispy()())
+        print(
+            f'FrisPy, its defaults: {theirs:.0f} flights per CPU-second, {error * 1e3:.1f} mm off'
+        )
+        print(f'  ten times the inertia moves the end by {moved:.2f} m')
+        print(f'ratio: {mine / theirs:.0f}')
+    print('shotshaper: not on PyPI, skipped')
+
+
+if __name__ == '__main__':
+    main()
