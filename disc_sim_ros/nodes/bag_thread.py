@@ -67,12 +67,12 @@ class BagThread(threading.Thread):
         """Write until asked to end, or until the disk refuses."""
         try:
             self._write_until_end()
-        except BagError as error:
-            self.failure = error
+        except Exception as error:  # whatever it is, the bag is closed
+            self.failure = _as_bag_error(error)
         try:
             self._writer.close()
-        except BagError as error:
-            self.failure = self.failure or error
+        except Exception as error:
+            self.failure = self.failure or _as_bag_error(error)
         self._refuse_jobs()
 
     def _write_until_end(self) -> None:
@@ -99,8 +99,8 @@ class BagThread(threading.Thread):
                 job, future = item
                 try:
                     future.set_result(job(writer))
-                except BagError as error:
-                    future.set_exception(error)
+                except Exception as error:
+                    future.set_exception(_as_bag_error(error))
                     raise
 
     def _refuse_jobs(self) -> None:
@@ -108,3 +108,9 @@ class BagThread(threading.Thread):
         for item in self._queue:
             if len(item) == 2:
                 item[1].set_exception(error)
+
+
+def _as_bag_error(error: Exception) -> BagError:
+    if isinstance(error, BagError):
+        return error
+    return BagError(f'the bag cannot be written ({type(error).__name__}: {error})')

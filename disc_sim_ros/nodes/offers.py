@@ -36,8 +36,9 @@ def same(one: QoSProfile, other: QoSProfile) -> bool:
 
 
 def topic_of(name: str, type_name: str, publishers: Sequence[TopicEndpointInfo]) -> Topic:
-    """Return what the bag says of a topic with these publishers."""
-    hashes = [str(p.topic_type_hash) for p in publishers if p.topic_type == type_name]
+    """Return what the bag says of a topic with these publishers, as far as they have its type."""
+    publishers = [p for p in publishers if p.topic_type == type_name]
+    hashes = [str(p.topic_type_hash) for p in publishers]
     return Topic(
         name=name,
         type=type_name,

@@ -57,19 +57,27 @@ removed ends it with exit code 1 and a bag that can be read. An existing bag is 
 code 2.
 
 - **Found** within 0.05 s of the graph knowing it, whatever publishes it, before or after the
-  start.
-- **Asked for** as reliably as all publishers of a topic offer; if one comes that offers less, a
-  second subscription takes over, and nothing is recorded twice or left out.
+  start. Hidden topics (with a part that begins with `_`) are recorded if `topics` names them, and
+  topics that nobody but the recorder publishes if `topics` or `regex` does. A type that is not
+  installed, or a second type on a topic, is warned of once; the rest goes on.
+- **Asked for** as reliably as all publishers of a topic offer, 5000 messages deep, which is half a
+  second at 10 kHz; if a publisher comes that offers less, a second subscription takes over, and
+  nothing is recorded twice or left out.
+- **Taken** every 10 ms, every 1 ms with `use_sim_time`, by a thread of its own, as bytes.
 - **Stamped** with the time of arrival as log time (of `/clock` with `use_sim_time`; what comes
-  before the first `/clock` gets that time) and the time of sending as publish time.
-- **Counted**: messages that the middleware lost, numbers missing in the sequence of a publisher,
-  and messages dropped because 512 MiB waited for the disk stand in `/diagnostics`, in the log and
-  in `custom_data` of the bag, as `lost`, `gaps` and `dropped` with the topic.
+  before the first `/clock` waits for it and gets that time, or that of arrival if none comes) and
+  the time of sending as publish time.
+- **Counted**: messages that the middleware lost, numbers missing in the sequence of a publisher
+  that is alone on its topic, and messages dropped because 512 MiB waited for the disk stand in
+  `/diagnostics`, in the log and in `custom_data` of the bag, as `lost`, `gaps` and `dropped` with
+  the topic. A message can be in both `lost` and `gaps`. `/diagnostics` tells once a second also
+  how much is recorded and waits, how late a message was taken, and the room on the disk.
+- **Alone** in its bag: a second recorder of the same name goes on with another bag, and both warn.
 
 | service (std_srvs/Trigger) | does |
 |---|---|
 | `~/pause` | record nothing until `~/resume` |
-| `~/resume` | go on, with the last message of each latched topic that came meanwhile |
+| `~/resume` | go on, with the last message of each latched publisher that came meanwhile |
 | `~/split` | begin the next file of the bag |
 | `~/flush` | bring everything to the disk now |
 

@@ -109,6 +109,11 @@ class Selection:
     regex: re.Pattern[str] | None = None
     exclude: re.Pattern[str] | None = None
 
+    @property
+    def everything(self) -> bool:
+        """Whether nobody said which topics are wanted."""
+        return not self.names and self.regex is None
+
     def takes(self, name: str) -> bool:
         """Say whether a topic is recorded; a part that begins with _ hides it, as in rosbag2."""
         if self.exclude is not None and self.exclude.fullmatch(name):
@@ -119,7 +124,7 @@ class Selection:
             return False
         if self.regex is not None:
             return self.regex.fullmatch(name) is not None
-        return not self.names
+        return self.everything
 
     def __str__(self) -> str:
         parts = sorted(self.names)

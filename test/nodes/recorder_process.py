@@ -17,6 +17,7 @@ from std_msgs.msg import Int64
 from disc_sim_ros.bags.reader import open_bag
 
 RELIABLE = QoSProfile(depth=20_000)
+_MAIN = 'from disc_sim_ros.cli.recorder_node import main\nsys.exit(main())'
 COUNT = struct.Struct('<4xq')  # a serialised std_msgs/Int64
 
 
@@ -28,11 +29,15 @@ class Recorder:
         process: The process.
     """
 
-    def __init__(self, ros: Harness, bag: Path, parameters: Mapping[str, object]) -> None:
+    def __init__(
+        self, ros: Harness, bag: Path, parameters: Mapping[str, object], before: str = ''
+    ) -> None:
+        """Start it; `before` is Python to run in its process first."""
         self.bag = bag
         self._ros = ros
         self._log = bag.with_name(f'{bag.name}.log')
-        command = [sys.executable, '-m', 'disc_sim_ros.nodes.recorder_node', '--ros-args']
+        program = f'import sys\n{before}\n{_MAIN}'
+        command = [sys.executable, '-c', program, '--ros-args']
         for name, value in {'bag': bag, **parameters}.items():
             text = str(value).lower() if isinstance(value, bool) else value
             command += ['-p', f'{name}:={text}']

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 import re
+import sys
 
 import pytest
 import yaml
@@ -74,10 +75,30 @@ def test_a_request_is_met_by_every_offer():
         assert requested(offers).durability == DurabilityPolicy.VOLATILE
 
 
-@pytest.mark.parametrize('name', ['no_such_msgs/msg/Thing', 'nav_msgs/msg/NoSuch', 'nonsense'])
-def test_a_type_that_is_not_installed_is_an_import_error(name):
+@pytest.mark.parametrize(
+    'name',
+    [
+        'no_such_msgs/msg/Thing',
+        'nav_msgs/msg/NoSuch',
+        'nav_msgs/msg/msg',
+        'nonsense',
+        '/x/y',
+        '../msg/X',
+        'std_msgs/msg/Int64\n',
+        'antigravity/msg/X',
+        'wsgiref/simple_server/WSGIServer',
+    ],
+)
+def test_a_name_that_is_not_of_an_installed_type_is_an_import_error(name):
     with pytest.raises(ImportError):
         message_type(name)
+    assert 'wsgiref.simple_server' not in sys.modules  # names from the network run no code
+
+
+def test_everything_is_what_nobody_chose():
+    assert recorder_config({'exclude': '/rosout'}).selection.everything
+    assert not recorder_config({'topics': '/odom'}).selection.everything
+    assert not recorder_config({'regex': '/.*'}).selection.everything
 
 
 @pytest.mark.parametrize(
