@@ -3,8 +3,8 @@
 python3 -m venv peers && peers/bin/pip install . FrisPy
 peers/bin/python benchmarks/peers.py [seconds of each, 3]
 
-FrisPy comes from PyPI and wants an older numpy, hence an environment of its own; without it there is
-a line instead. shotshaper is not on PyPI.
+FrisPy comes from PyPI and wants an older numpy, hence an environment of its own; without it there
+is a line instead. shotshaper is not on PyPI.
 Each simulator flies its own disc for 3 s in the air, so that errors are against the same simulator
 with a tolerance or a step that is far finer; what they say of the same throw is not compared.
 """
