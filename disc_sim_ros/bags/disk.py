@@ -126,6 +126,8 @@ def new_folder(folder: Path) -> Path:
             raise ConfigError('bag', str(folder), 'it exists already, and is never overwritten')
         whole.parent.mkdir(parents=True, exist_ok=True)
         whole.mkdir()
+    except ConfigError:  # which is a ValueError
+        raise
     except (OSError, ValueError) as error:
         why = reason(error) if isinstance(error, OSError) else str(error)
         raise ConfigError('bag', str(folder), f'the folder cannot be made ({why})') from None
