@@ -120,15 +120,17 @@ def new_folder(folder: Path) -> Path:
     """
     try:
         whole = folder.absolute()
+        problem = ''
         if not whole.name or whole.name in {'.', '..'}:
-            raise ConfigError('bag', str(folder), 'give the name of a new folder')
-        if whole.exists() or whole.is_symlink():
-            raise ConfigError('bag', str(folder), 'it exists already, and is never overwritten')
-        whole.parent.mkdir(parents=True, exist_ok=True)
-        whole.mkdir()
-    except ConfigError:  # which is a ValueError
-        raise
+            problem = 'give the name of a new folder'
+        elif whole.exists() or whole.is_symlink():
+            problem = 'it exists already, and is never overwritten'
+        else:
+            whole.parent.mkdir(parents=True, exist_ok=True)
+            whole.mkdir()
     except (OSError, ValueError) as error:
         why = reason(error) if isinstance(error, OSError) else str(error)
-        raise ConfigError('bag', str(folder), f'the folder cannot be made ({why})') from None
+        problem = f'the folder cannot be made ({why})'
+    if problem:
+        raise ConfigError('bag', str(folder), problem)
     return whole
