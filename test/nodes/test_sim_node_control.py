@@ -256,7 +256,7 @@ def test_nobody_waits_for_a_message_that_is_due_in_minutes(ros, slow):
     ros.spin_until(lambda: ns(odom[-1]) == release, 'the release')
     assert ros.set(sim, {'real_time_factor': 1000.0}).successful
     fly_until(ros, odom, release + 20 * SECOND)
-    assert time.monotonic() - begun < patience(2.0)
+    assert time.monotonic() - begun < patience(5.0)  # the message is due in 10 s at least
 
 
 # ---- parameters ----
