@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 import multiprocessing
 import os
@@ -129,34 +129,25 @@ def made(name: str) -> Path:
 
 def _parts(chosen: argparse.Namespace, folder: Path) -> Iterator['Done']:
     """Yield the parts as they get done."""
+    from disc_sim_ros.analysis.ensembles import executors  # noqa: PLC0415
     from disc_sim_ros.experiments import run  # noqa: PLC0415
 
     if chosen.jobs == 1 or len(chosen.only) == 1:
         for key in chosen.only:
             yield run.part(key, folder, chosen.formats, dark=chosen.dark)
         return
-    # Fresh processes: a copy of this one could not use numba's threads and locks.
-    context = multiprocessing.get_context('spawn')
-    jobs = min(chosen.jobs, len(chosen.only))
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_end_at_ctrl_c)
-    try:
-        waiting = [
-            pool.submit(run.part, key, folder, chosen.formats, dark=chosen.dark)
-            for key in sorted(chosen.only, key=lambda key: key not in SLOW)
-        ]
-        for future in as_completed(waiting):
-            yield future.result()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in multiprocessing.active_children():
-            child.terminate()
-        raise
-    pool.shutdown()
-
-
-def _end_at_ctrl_c() -> None:
-    """Let Ctrl-C, which a terminal sends to all, end a process without a traceback."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    with executors.processes(min(chosen.jobs, len(chosen.only))) as pool:
+        try:
+            waiting = [
+                pool.submit(run.part, key, folder, chosen.formats, dark=chosen.dark)
+                for key in sorted(chosen.only, key=lambda key: key not in SLOW)
+            ]
+            for future in as_completed(waiting):
+                yield future.result()
+        except BaseException:
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 def _compile() -> None:

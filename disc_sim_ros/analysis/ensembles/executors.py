@@ -1,9 +1,10 @@
 """Executors by name: processes of this machine, or a Dask cluster."""
 
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 import multiprocessing
+from multiprocessing import resource_tracker
 import os
 import signal
 import threading
@@ -39,7 +40,7 @@ def opened(name: str, workers: int | None = None) -> Iterator[tuple[Executor | N
     if kind == THREADS:
         yield None, wanted
     elif kind == PROCESSES:
-        with _processes(wanted) as pool:
+        with processes(wanted) as pool:
             yield pool, wanted
     else:
         with _dask(name, address, wanted) as (pool, found):
@@ -47,19 +48,33 @@ def opened(name: str, workers: int | None = None) -> Iterator[tuple[Executor | N
 
 
 @contextmanager
-def _processes(workers: int) -> Iterator[Executor]:
-    # Fresh processes: a copy of this one could not use numba's threads and locks.
+def processes(workers: int) -> Iterator[Executor]:
+    """Yield an executor of fresh processes, which leave Ctrl-C to this one and end with it."""
+    # Fresh: a copy of this process could not use numba's threads and locks.
     context = multiprocessing.get_context('spawn')
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+    pool = _Processes(workers, mp_context=context, initializer=_begin_worker)
     try:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+class _Processes(ProcessPoolExecutor):
+    """Starts its processes with SIGINT held: none dies of Ctrl-C before `_begin_worker`."""
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        resource_tracker.ensure_running()  # starting it lets go of what is held
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            return super().submit(function, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it, however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     parent = multiprocessing.parent_process()
     if parent is None:
         return
