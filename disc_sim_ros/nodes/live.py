@@ -7,7 +7,6 @@ import fcntl
 import math
 import os
 from pathlib import Path
-import signal
 import socket
 import subprocess
 import sys
@@ -122,13 +121,15 @@ class Process:
             raise self._failed(f'ended with code {self._process.returncode}')
 
     def end(self) -> None:
-        """Send SIGINT and wait for the end.
+        """Send SIGTERM and wait for the end.
+
+        A Python that is still importing may swallow a SIGINT, but never this.
 
         Raises:
             DiscSimError: It did not end, or not with 0.
         """
         if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
+            self._process.terminate()
         try:
             code = self._process.wait(END)
         except subprocess.TimeoutExpired:
