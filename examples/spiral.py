@@ -29,7 +29,8 @@ from disc_sim_ros.nodes.topics import (
     STATE_QOS,
 )
 
-RATE = 50.0  # Hz; a command that is not renewed for command_timeout, 0.5 s, falls to zero
+RATE = 50.0  # Hz
+TIMEOUT = 10.0  # s of simulated time; the paper's moment is constant, however late a renewal is
 
 
 @dataclass(frozen=True)
@@ -71,14 +72,17 @@ class Commander(Flier):
 
     def is_ready(self) -> bool:
         """Say whether our command acts already: then it does so from the release on."""
-        return super().is_ready() and bool(self._applied)
+        return super().is_ready() and self._message.vector in [m.vector for m in self._applied]
 
 
 def parameters(manoeuvre: Manoeuvre) -> dict[str, object]:
     """Return the parameters of a sim_node that throws so."""
     diameter = catalogue.load('frisbee').diameter
     spin = spin_rate(manoeuvre.advance_ratio, diameter, manoeuvre.launch['speed'])
-    return {f'launch.{name}': value for name, value in {**manoeuvre.launch, 'spin': spin}.items()}
+    launch = {**manoeuvre.launch, 'spin': spin}
+    return {f'launch.{name}': value for name, value in launch.items()} | {
+        'command_timeout': TIMEOUT
+    }
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
