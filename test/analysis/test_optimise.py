@@ -20,6 +20,8 @@ from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
 
+pytestmark = pytest.mark.xdist_group('optimise')
+
 FRISBEE = catalogue.load('frisbee')
 SETUP = Setup(disc=FRISBEE, step=0.02)
 VACUUM = Setup(disc=FRISBEE, step=0.02, air=Air(density=0.0))

@@ -13,6 +13,8 @@ from disc_sim_ros.core.launch import Launch
 from disc_sim_ros.experiments import drawing, paper
 from disc_sim_ros.experiments.drawing import DARK, LIGHT, LOOKS
 
+pytestmark = pytest.mark.xdist_group('figures')  # computed once
+
 
 @pytest.mark.parametrize('key', FIGURES)
 def test_each_figure_names_damping_and_moment_axes_and_labels_its_axes(key):

@@ -19,6 +19,8 @@ from disc_sim_ros.experiments import (
 from disc_sim_ros.experiments import fig11_spiral_turn as fig11
 from disc_sim_ros.experiments.paper import PRINTED, TENTH
 
+pytestmark = pytest.mark.xdist_group('figures')  # computed once
+
 DOCS = Path(__file__).parents[2] / 'docs'
 PAGE = (DOCS / 'figures.md').read_text(encoding='utf-8')
 

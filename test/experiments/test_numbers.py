@@ -21,6 +21,8 @@ from disc_sim_ros.experiments import (
 )
 from disc_sim_ros.experiments.paper import HUNDREDTH, PRINTED, TENTH
 
+pytestmark = pytest.mark.xdist_group('figures')  # computed once
+
 pytestmark = pytest.mark.paper
 
 

@@ -16,6 +16,8 @@ from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.experiments import report, run
 from disc_sim_ros.experiments.output import Written
 
+pytestmark = pytest.mark.xdist_group('paper_figures')
+
 PROGRAM = [sys.executable, '-m', 'disc_sim_ros.cli.paper_figures']
 
 

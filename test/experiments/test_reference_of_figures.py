@@ -17,6 +17,8 @@ from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
 from disc_sim_ros.experiments import independent, paper
 
+pytestmark = pytest.mark.xdist_group('figures')  # computed once
+
 CLOSE = 0.01  # m, what the figures promise
 STEP = 1e-3  # s, of the reference: five times its own, still 5e-6 m from it by its docstring
 

@@ -16,6 +16,8 @@ from disc_sim_ros.experiments.statements.rule import (
     rounding,
 )
 
+pytestmark = pytest.mark.xdist_group('figures')  # computed once
+
 
 @pytest.fixture(scope='module')
 def results():

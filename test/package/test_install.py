@@ -14,6 +14,8 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
+pytestmark = pytest.mark.xdist_group('install')
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = 'disc_sim_ros'
 TALK_ROS = {'sim_node', 'recorder_node', 'demo'}  # the only executables that may need rclpy
