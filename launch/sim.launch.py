@@ -16,7 +16,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 import yaml
 
 from disc_sim_ros.nodes import topics
-from disc_sim_ros.nodes.parameter_table import TABLE, Entry, allowed_text, plain
+from disc_sim_ros.nodes.entry import Entry, allowed_text, plain
+from disc_sim_ros.nodes.parameter_table import TABLE
 
 SHARE = Path(__file__).parents[1]  # launch/, config/, rviz/ and urdf/ are side by side there
 NOT_GIVEN = ''

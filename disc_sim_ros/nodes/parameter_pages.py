@@ -11,7 +11,8 @@ import textwrap
 import yaml
 
 from disc_sim_ros.core import check
-from disc_sim_ros.nodes.parameter_table import GROUPS, Entry, Value, allowed_text, plain
+from disc_sim_ros.nodes.entry import Entry, Value, allowed_text, plain
+from disc_sim_ros.nodes.parameter_table import GROUPS
 from disc_sim_ros.nodes.recorder_config import RECORDER_GROUPS
 
 _PAGE = """\

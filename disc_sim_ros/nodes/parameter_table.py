@@ -1,51 +1,17 @@
 """Every parameter of sim_node, in one table: name, default, range, unit, when a change counts."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-import math
-from typing import Literal
 
 from disc_sim_ros.core.air import Air, Wind
 from disc_sim_ros.core.disc import AERODYNAMICS
 from disc_sim_ros.core.flight import MODELS, MOMENT_AXES
 from disc_sim_ros.core.launch import LIMITS, Launch
-
-Value = bool | int | float | str | tuple[float, ...]
-Effect = Literal['next throw', 'at once', 'fixed']
+from disc_sim_ros.nodes.entry import Entry
 
 _ZEROS = (0.0, 0.0, 0.0)
 _LARGEST_SEED = 2**63 - 1
 _LATEST_START = 2.1e9  # s; stamps end at 2^31 s, this leaves a year and a half
 PREFIX_RULE = 'letters, digits and _ after a letter, or such parts with / after each'
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One parameter. The type of its default is its type; a tuple is an array of doubles.
-
-    Attributes:
-        name: Its name in ROS.
-        default: Its value unless another is given.
-        effect: When a change counts; what is 'fixed' is read-only.
-        meaning: A sentence.
-        unit: Of a number, and of its range.
-        lowest: Least allowed number.
-        highest: Greatest allowed number.
-        choices: Allowed words; any text where empty.
-        constraint: What else is asked for, a part of a sentence.
-        listed: Whether a text holds words with spaces between; a list of texts will do, too.
-    """
-
-    name: str
-    default: Value
-    effect: Effect
-    meaning: str
-    unit: str = ''
-    lowest: float = -math.inf
-    highest: float = math.inf
-    choices: Sequence[str] = ()
-    constraint: str = ''
-    listed: bool = False
 
 
 def _launch() -> Iterator[Entry]:
@@ -262,27 +228,3 @@ GROUPS: Mapping[str, Sequence[Entry]] = {
     ),
 }
 TABLE = tuple(entry for group in GROUPS.values() for entry in group)
-
-
-def allowed_text(entry: Entry) -> str:
-    """Return the range or the words of a parameter, as part of a sentence."""
-    match entry.default:
-        case bool():
-            return 'true or false'
-        case str():
-            return words(entry.choices)
-        case tuple():
-            return f'{len(entry.default)} numbers from {entry.lowest:g} to {entry.highest:g}'
-        case int():
-            return f'{entry.lowest} to {entry.highest}'
-    return f'{entry.lowest:g} to {entry.highest:g}'
-
-
-def words(choices: Sequence[str]) -> str:
-    """Return words with commas between them; the empty one as a pair of quotes."""
-    return ', '.join(word or "''" for word in choices)
-
-
-def plain(value: Value) -> bool | int | float | str | list[float]:
-    """Return a value as YAML and rclpy know it."""
-    return list(value) if isinstance(value, tuple) else value

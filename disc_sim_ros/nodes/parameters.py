@@ -1,15 +1,14 @@
-"""The parameters of sim_node in ROS: declared, described, refused."""
+"""The parameters of a table in ROS: declared, described, refused."""
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from disc_sim_ros.core.errors import ConfigError
-from disc_sim_ros.nodes.parameter_table import TABLE, Entry, Value, allowed_text, plain
-from disc_sim_ros.nodes.sim_config import checked, configuration, no_such
+from disc_sim_ros.nodes.entry import Entry, Value, allowed_text, checked, no_such, plain
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 _QOS = 'qos_overrides.'
@@ -27,7 +26,7 @@ _WHEN = {
 }
 
 
-def declare(node: Node, table: Sequence[Entry] = TABLE) -> None:
+def declare(node: Node, table: Sequence[Entry]) -> None:
     """Declare the parameters of a table, with the values that came from files and command line.
 
     A parameter has one type for good, so that `ros2 param describe` tells type and range, and an
@@ -63,27 +62,38 @@ def refuse_unused(node: Node) -> None:
             raise ConfigError(name, value, no_such(name, declared))
 
 
-def values(node: Node, table: Sequence[Entry] = TABLE) -> dict[str, object]:
+def values(node: Node, table: Sequence[Entry]) -> dict[str, object]:
     """Return the present value of every parameter of a table, arrays as tuples."""
     present = {entry.name: node.get_parameter(entry.name).value for entry in table}
     return {n: tuple(x) if isinstance(x, list | array) else x for n, x in present.items()}
 
 
-def refusal(node: Node, changes: Sequence[Parameter]) -> str:
+def refusal(
+    node: Node,
+    changes: Sequence[Parameter],
+    table: Sequence[Entry],
+    judge: Callable[[Mapping[str, object]], object],
+) -> str:
     """Return why a set of changes is impossible, as a whole; empty if it is possible.
 
     Parameters of ROS itself, such as use_sim_time, are not looked at.
+
+    Args:
+        node: Who declared the table.
+        changes: What is asked for.
+        table: Its parameters.
+        judge: Raises ConfigError where the values of all do not go together.
     """
-    now = values(node)
+    now = values(node, table)
     new = {change.name: change.value for change in changes if change.name in now}
     try:
-        configuration({**now, **new})
+        judge({**now, **new})
     except ConfigError as error:
         return str(error)
     return ''
 
 
-def widened(changes: Sequence[Parameter], table: Sequence[Entry] = TABLE) -> list[Parameter]:
+def widened(changes: Sequence[Parameter], table: Sequence[Entry]) -> list[Parameter]:
     """Return changes with integers made doubles where doubles are due.
 
     For `add_pre_set_parameters_callback`: `ros2 param set /sim_node launch.speed 20` sends an

@@ -9,8 +9,7 @@ from typing import Any
 
 from disc_sim_ros.bags.mcap_file import COMPRESSIONS
 from disc_sim_ros.core.errors import ConfigError
-from disc_sim_ros.nodes.parameter_table import Entry
-from disc_sim_ros.nodes.sim_config import checked
+from disc_sim_ros.nodes.entry import Entry, checked
 
 _MIB = 1024 * 1024
 _LARGEST_MIB = 1_000_000  # a terabyte

@@ -1,29 +1,21 @@
 """What the parameters of sim_node mean together: checked as a whole, without ROS."""
 
-from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-import difflib
 from functools import lru_cache
 import math
 from pathlib import Path
 import re
 from typing import Any
 
-from disc_sim_ros.core import axes, catalogue, check
+from disc_sim_ros.core import axes, catalogue
 from disc_sim_ros.core.air import Air, Wind
 from disc_sim_ros.core.disc import Disc
 from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.core.flight import Setup
 from disc_sim_ros.core.launch import LIMITS, Launch
-from disc_sim_ros.nodes.parameter_table import (
-    PREFIX_RULE,
-    TABLE,
-    Entry,
-    Value,
-    allowed_text,
-    words,
-)
+from disc_sim_ros.nodes.entry import checked
+from disc_sim_ros.nodes.parameter_table import PREFIX_RULE, TABLE
 
 _FRAME_PREFIX = re.compile(r'([A-Za-z]\w*/)*([A-Za-z]\w*)?', re.ASCII)
 _INTEGER_RATIO = 1e-9  # relative; how far physics_rate / publish_rate may be from a whole number
@@ -82,19 +74,6 @@ class SimConfig:
     imu: ImuConfig
 
 
-def checked(values: Mapping[str, object], table: Sequence[Entry] = TABLE) -> dict[str, Any]:
-    """Return a value for every parameter, each in its own range: those given, else defaults.
-
-    Raises:
-        ConfigError: A name that is not in the table, a wrong type or a value out of range.
-    """
-    names = [entry.name for entry in table]
-    for name, value in values.items():
-        if name not in names:
-            raise ConfigError(name, value, no_such(name, names))
-    return {entry.name: _clean(entry, values.get(entry.name, entry.default)) for entry in table}
-
-
 def configuration(values: Mapping[str, object]) -> SimConfig:
     """Return what the parameters mean together; those that are not given have their defaults.
 
@@ -102,65 +81,11 @@ def configuration(values: Mapping[str, object]) -> SimConfig:
         ConfigError: A value is not allowed, or not together with the others; its `thing` is the
             name of the parameter.
     """
-    v = checked(values)
+    v = checked(values, TABLE)
     try:
         return _configuration(v)
     except ConfigError as error:
         raise _in_ros_words(error, v) from None
-
-
-def no_such(name: str, names: Sequence[str]) -> str:
-    """Return that there is no parameter of this name, and which may be meant."""
-    tails = [known for known in names if known.endswith(f'.{name}')]
-    close = tails or difflib.get_close_matches(name, names, n=1)
-    guess = f', did you mean {" or ".join(close)}?' if close else ''
-    return f'there is no such parameter{guess}'
-
-
-def _clean(entry: Entry, value: object) -> Value:
-    """Return a value as the type of the parameter; a whole number is a double where one is due."""
-    name = entry.name
-    match entry.default:
-        case bool() if isinstance(value, bool):
-            return value
-        case bool():
-            raise ConfigError(name, value, 'give true or false')
-        case int():
-            return _whole_number(entry, value)
-        case float():
-            return check.number(name, value, entry.lowest, entry.highest, unit=entry.unit)
-        case str():
-            return _text(entry, value)
-    return _numbers(entry, value, len(entry.default))
-
-
-def _whole_number(entry: Entry, value: object) -> int:
-    match value:
-        case bool():
-            pass
-        case int() if entry.lowest <= value <= entry.highest:
-            return value
-    raise ConfigError(entry.name, value, f'give a whole number from {allowed_text(entry)}')
-
-
-def _text(entry: Entry, value: object) -> str:
-    if entry.listed and isinstance(value, list | tuple) and all(isinstance(x, str) for x in value):
-        value = ' '.join(value)
-    if not isinstance(value, str):
-        raise ConfigError(entry.name, value, 'give a text')
-    if entry.choices and value not in entry.choices:
-        raise ConfigError(entry.name, value, f'choose from {words(entry.choices)}')
-    return value
-
-
-def _numbers(entry: Entry, value: object, count: int) -> tuple[float, ...]:
-    allowed = f'give {allowed_text(entry)} {entry.unit}'
-    if not isinstance(value, list | tuple | array) or len(value) != count:
-        raise ConfigError(entry.name, value, allowed)
-    try:
-        return tuple(check.number('', x, entry.lowest, entry.highest) for x in value)
-    except ConfigError:
-        raise ConfigError(entry.name, list(value), allowed) from None
 
 
 def _configuration(v: Mapping[str, Any]) -> SimConfig:

@@ -25,6 +25,7 @@ from disc_sim_ros.nodes import parameters, topics
 from disc_sim_ros.nodes.channels import NodeMedium
 from disc_sim_ros.nodes.commands import Commands
 from disc_sim_ros.nodes.outputs import Outputs
+from disc_sim_ros.nodes.parameter_table import TABLE
 from disc_sim_ros.nodes.program import init, on_signal, plainly
 from disc_sim_ros.nodes.sim_config import SimConfig, configuration
 from disc_sim_ros.nodes.sim_loop import SimLoop
@@ -45,8 +46,8 @@ class SimNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         """Declare parameters, make publishers and subscriptions; `start` starts the loop."""
         super().__init__('sim_node', **kwargs)
-        parameters.declare(self)
-        config = configuration(parameters.values(self))
+        parameters.declare(self, TABLE)
+        config = configuration(parameters.values(self, TABLE))
         frames = topics.Frames.prefixed(config.frame_prefix)
         self._disc = frames.disc
         outputs = Outputs(NodeMedium(self), frames, with_clock=config.publish_clock)
@@ -58,7 +59,7 @@ class SimNode(Node):
         self.create_service(Trigger, '~/step', self._on_step)
         self.create_service(SetBool, '~/pause', self._on_pause)
         parameters.refuse_unused(self)
-        self.add_pre_set_parameters_callback(parameters.widened)
+        self.add_pre_set_parameters_callback(lambda new: parameters.widened(new, TABLE))
         self.add_on_set_parameters_callback(self._on_set)
         self.add_post_set_parameters_callback(self._after_set)
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, 10)
@@ -107,11 +108,11 @@ class SimNode(Node):
     # ---- parameters ----
 
     def _on_set(self, changes: list[Parameter]) -> SetParametersResult:
-        reason = parameters.refusal(self, changes)
+        reason = parameters.refusal(self, changes, TABLE, configuration)
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _after_set(self, _: list[Parameter]) -> None:
-        config = configuration(parameters.values(self))
+        config = configuration(parameters.values(self, TABLE))
         self.loop.submit(lambda: self.loop.configure(config))
 
     # ---- diagnostics ----

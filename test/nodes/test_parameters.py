@@ -23,7 +23,8 @@ from disc_sim_ros.core.air import Air, Wind
 from disc_sim_ros.core.errors import ConfigError
 from disc_sim_ros.core.launch import LIMITS, Launch
 from disc_sim_ros.nodes import parameter_pages, parameters
-from disc_sim_ros.nodes.parameter_table import TABLE, Entry
+from disc_sim_ros.nodes.entry import Entry
+from disc_sim_ros.nodes.parameter_table import TABLE
 from disc_sim_ros.nodes.sim_config import configuration
 
 ROOT = Path(__file__).parents[2]
@@ -318,8 +319,8 @@ def declared(new_node):
 
     def make(*arguments, **kwargs):
         node = new_node(*arguments, **kwargs)
-        parameters.declare(node)
-        node.add_pre_set_parameters_callback(parameters.widened)
+        parameters.declare(node, TABLE)
+        node.add_pre_set_parameters_callback(lambda new: parameters.widened(new, TABLE))
         node.add_on_set_parameters_callback(lambda changes: verdict(node, changes))
         return node
 
@@ -327,7 +328,7 @@ def declared(new_node):
 
 
 def verdict(node: Node, changes: list[Parameter]) -> SetParametersResult:
-    reason = parameters.refusal(node, changes)
+    reason = parameters.refusal(node, changes, TABLE, configuration)
     return SetParametersResult(successful=not reason, reason=reason)
 
 
@@ -343,7 +344,7 @@ def parameter_file(folder: Path, text: str) -> tuple[str, str]:
 
 @pytest.mark.ros
 def test_without_arguments_the_values_are_the_defaults(declared):
-    assert parameters.values(declared()) == DEFAULTS
+    assert parameters.values(declared(), TABLE) == DEFAULTS
 
 
 @pytest.mark.ros
@@ -374,7 +375,7 @@ def test_descriptions_show_range_unit_effect_and_choices(declared):
 @pytest.mark.ros
 def test_the_file_of_the_package_is_taken_whole(declared):
     node = declared('--params-file', str(ROOT / 'config/sim.yaml'), name='other', namespace='/a/b')
-    assert parameters.values(node) == DEFAULTS
+    assert parameters.values(node, TABLE) == DEFAULTS
     parameters.refuse_unused(node)
 
 
@@ -385,7 +386,7 @@ def test_values_come_from_file_command_line_and_constructor(declared, tmp_path):
         '-p', 'launch.pitch:=4.5', '-p', 'frame_prefix:=red/', '-p', 'ground:=false',
         parameter_overrides=change(wind__seed=7, imu__gyroscope_bias=[0.5, 0.0, 0.0]),
     )  # fmt: skip
-    assert parameters.values(node) == DEFAULTS | {
+    assert parameters.values(node, TABLE) == DEFAULTS | {
         'launch.speed': 20.5,
         'launch.pitch': 4.5,
         'wind.y': -2.5,
@@ -403,7 +404,7 @@ def test_an_integer_will_do_for_a_double(declared, tmp_path):
         '-p', 'launch.speed:=20',
         parameter_overrides=change(gravity=9),
     )  # fmt: skip
-    values = parameters.values(node)
+    values = parameters.values(node, TABLE)
     assert (values['physics_rate'], values['launch.speed'], values['gravity']) == (2000, 20, 9)
     assert type(values['physics_rate']) is float
     assert values['imu.offset'] == (0.0, 0.0, 1.0)
@@ -439,7 +440,7 @@ def test_an_integer_will_do_for_a_double(declared, tmp_path):
 def test_a_bad_file_is_refused_in_one_line_and_nothing_declared(new_node, tmp_path, line, message):
     node = new_node(*parameter_file(tmp_path, line))
     with pytest.raises(ConfigError, match=message) as refused:
-        parameters.declare(node)
+        parameters.declare(node, TABLE)
     assert '\n' not in str(refused.value)
     assert not any(node.has_parameter(name) for name in DEFAULTS)
 
@@ -459,7 +460,7 @@ def test_a_misspelt_name_is_refused_wherever_it_comes_from(ros_environment, tmp_
             parameter_overrides=change(launch__sped=3.0) if source == 'constructor' else None,
         )
         with pytest.raises(ConfigError, match=r'launch\.sped: 3 .* did you mean launch\.speed\?'):
-            parameters.declare(node)
+            parameters.declare(node, TABLE)
         node.destroy_node()
     finally:
         context.try_shutdown()
@@ -523,7 +524,7 @@ def test_an_impossible_change_is_refused_as_a_whole(declared, changes, reason):
     assert not result.successful
     assert '\n' not in result.reason
     assert re.search(reason, result.reason)
-    assert parameters.values(node) == DEFAULTS
+    assert parameters.values(node, TABLE) == DEFAULTS
 
 
 @pytest.mark.ros
@@ -533,7 +534,7 @@ def test_a_change_that_is_only_possible_together_is_taken(declared):
     assert not alone.successful
     together = change(physics_rate=300.0, publish_rate=100.0, ground=False, launch__height=-5.0)
     assert node.set_parameters_atomically(together).successful
-    config = configuration(parameters.values(node))
+    config = configuration(parameters.values(node, TABLE))
     assert (config.steps_per_publish, config.launch.height, config.ground) == (3, -5.0, False)
 
 
@@ -572,16 +573,16 @@ def test_through_the_services_of_the_node(declared, new_node, ros_context):
 
         numbers = change(launch__speed=20, imu__offset=[0, 0, 1])
         assert answer(client.set_parameters_atomically(numbers)).result.successful
-        values = parameters.values(node)
+        values = parameters.values(node, TABLE)
         assert (values['launch.speed'], values['imu.offset']) == (20.0, (0.0, 0.0, 1.0))
         assert type(values['launch.speed']) is float
 
         doubles = change(imu__offset=[0.5, 0.0, 0.0])
         assert answer(client.set_parameters_atomically(doubles)).result.successful
-        assert parameters.values(node)['imu.offset'] == (0.5, 0.0, 0.0)
+        assert parameters.values(node, TABLE)['imu.offset'] == (0.5, 0.0, 0.0)
 
         (result,) = answer(client.set_parameters(change(publish_rate=300))).results
         assert result.reason.startswith('publish_rate: 300 is not allowed; physics_rate 1000 Hz')
-        assert parameters.values(node)['publish_rate'] == 200.0
+        assert parameters.values(node, TABLE)['publish_rate'] == 200.0
     finally:
         executor.shutdown()
