@@ -28,7 +28,7 @@ class Thrower(Node):
     """Publishes a launch state on `throw` and follows `flight_events`.
 
     Attributes:
-        events: Names of the events so far.
+        events: Names of the events since our throw, which is the first.
     """
 
     def __init__(self) -> None:
@@ -44,15 +44,11 @@ class Thrower(Node):
 
     def throw(self, release: Odometry) -> None:
         """Let the disc go now: with the stamp 0 there is nothing to wait for."""
-        self.events.clear()
         self._throw.publish(release)
 
     def end_of_flight(self) -> str:
         """Return the event that has ended the flight thrown last; empty as long as it flies."""
-        if 'thrown' not in self.events:
-            return ''
-        later = self.events[self.events.index('thrown') + 1 :]
-        return next((event for event in later if event in ENDS), '')
+        return next((event for event in self.events[1:] if event in ENDS), '')
 
     def spin_until(self, condition: Callable[[], object], patience: float = math.inf) -> bool:
         """Take messages until a condition holds; say whether it did within `patience` [s]."""
@@ -63,8 +59,11 @@ class Thrower(Node):
 
     def _on_event(self, event: DiagnosticStatus) -> None:
         name = event.name.rpartition(': ')[2]  # of, say, 'red/sim_node: landed'
-        print(f'{name}: {event.message}', flush=True)
-        self.events.append(name)
+        values = {pair.key: pair.value for pair in event.values}
+        ours = name == 'thrown' and values['from'] == 'throw'  # not by itself, nor by a service
+        if self.events or ours:
+            print(f'{name}: {event.message}', flush=True)
+            self.events.append(name)
 
 
 def release(options: argparse.Namespace) -> Odometry:
@@ -122,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
             return 1
         node.spin_until(lambda: False, TO_BE_FOUND)
         node.throw(release(options))
-        if not node.spin_until(lambda: 'thrown' in node.events, PATIENCE):
+        if not node.spin_until(lambda: node.events, PATIENCE):
             print('it did not throw: it is paused, or its log says why', file=sys.stderr)
             return 1
         node.spin_until(node.end_of_flight)

@@ -180,7 +180,12 @@ class Simulation:
         self.publish_wind()
         self._publish_held()
         speed = math.hypot(*sim.state[3:6])
-        values = {'flight': self.flight, 'speed_m_s': speed, 'spin_rad_s': sim.state.r}
+        values = {
+            'flight': self.flight,
+            'from': 'launch' if release is None else topics.THROW,
+            'speed_m_s': speed,
+            'spin_rad_s': sim.state.r,
+        }
         self._event('thrown', f'{speed:.2f} m/s, spin {sim.state.r:.2f} rad/s', values)
 
     def reset(self) -> None:
