@@ -106,7 +106,7 @@ setup(
             'packaging>=23',
             'dask>=2024.5',
             'distributed>=2024.5',
-            'pytest>=8,<10',
+            'pytest>=8,<9.2',
             'pytest-timeout>=2.3,<3',
             'pytest-xdist>=3.5,<4',
             'hypothesis>=6.100,<7',

@@ -43,7 +43,7 @@ WHY = {
     'numpy': 'arrays, normal random numbers',
     'Pillow': 'writes pictures into bags and for figures',
     'pyarrow': 'Parquet tables of ensembles',
-    'pytest': 'tests',
+    'pytest': 'tests; with 9.2, pytest-xdist 3.8 keeps no group together',
     'pytest-timeout': 'a hanging test ends',
     'pytest-xdist': 'tests on all cores at once',
     'PyYAML': 'disc files, configurations, metadata of bags',

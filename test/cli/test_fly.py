@@ -1126,12 +1126,3 @@ def test_plain_python_flies_the_compiled_flight(document):
     # The compiler may fuse and reorder; 400 steps of 1e-16 each.
     for name in ('landing_position_m', 'flight_time_s', 'apex_m', 'end_spin_rad_s'):
         assert_allclose(plain[name], compiled[name], rtol=0.0, atol=1e-9)
-
-
-@pytest.mark.slow
-def test_it_flies_without_a_place_for_compiled_code(document):
-    nowhere = environment(HOME=None, NUMBA_CACHE_DIR=None, XDG_CACHE_HOME='/proc/nonexistent')
-    ended = start('--json', env=nowhere)
-    assert ended.returncode == 0
-    assert re.fullmatch(r'fly: note: compiling [^\n]+\n', ended.stderr)
-    assert json.loads(ended.stdout) == document()

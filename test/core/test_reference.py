@@ -19,6 +19,8 @@ from disc_sim_ros.core.equations import Control
 from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
 
+pytestmark = pytest.mark.xdist_group('figures')  # with others that compile the reference
+
 STEP = 5e-4  # s
 
 

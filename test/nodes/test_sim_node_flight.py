@@ -392,8 +392,9 @@ def test_all_that_is_said_of_one_step_agrees(ros):
     bench = Bench(ros, parameters, *KINDS).ready()
     bench.throw()
     bench.go(1.0)
-    count = 700
+    count = 400
     odometry = bench.wait_for(count)
+    ros.pause(bench.sim)  # 14 topics at 1 kHz are more than one listener in Python can take
     transforms = bench.all_of(topics.TRANSFORM, 2 * count)[: 2 * count]
     said = {name: messages[:count] for name, messages in bench.heard.items()}
     tilts, turns = transforms[::2], transforms[1::2]

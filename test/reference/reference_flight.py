@@ -263,7 +263,7 @@ def _left_segment(y: np.ndarray, new: np.ndarray, air: tuple) -> tuple:
     return cell, 0.0, False
 
 
-@njit
+@njit(cache=True)  # once for all processes that test with it
 def _integrate(y0: np.ndarray, times: np.ndarray, limits: tuple, model: tuple) -> tuple:
     """Fly from y0; return landed, the end time, the last state, the states at times, their count.
 
