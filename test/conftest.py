@@ -10,6 +10,7 @@ IN_REAL_TIME, MAKES_WAY = 0, 10  # niceness
 FIRST = {'test_sim_node_control', 'test_recorder', 'test_parameters'}  # half of those with nodes
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks at the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Deal out the tests of real nodes to two workers, and begin with them.
 
