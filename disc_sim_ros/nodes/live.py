@@ -115,6 +115,11 @@ class Process:
                 start_new_session=True,
             )
 
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
     def check(self) -> None:
         """Raise where it has ended by itself."""
         if self._process.poll() is not None:

@@ -19,7 +19,8 @@ from disc_sim_ros.nodes.timeline import Timeline
 
 LONGEST_SLEEP = 0.01  # s
 LONGEST_WAIT = 0.5  # s of wall time for a request until a message is due
-LONGEST_QUANTUM = 1e-3  # s of simulated time between two looks at the command topics
+LONGEST_QUANTUM = 1e-3  # s of simulated time between two looks at the command topics, at a pace
+FAST_QUANTUM = 0.02  # s of it as fast as possible, where that is no time at all
 
 
 class SimLoop(threading.Thread):
@@ -173,10 +174,10 @@ class SimLoop(threading.Thread):
     def _due(self) -> int:
         """Return how many steps are due, after sleeping until it is time for some."""
         config = self._simulation.config
-        quantum = max(1, min(config.steps_per_publish, round(LONGEST_QUANTUM / config.setup.step)))
         if config.real_time_factor == 0.0:
             time.sleep(0)  # lets other threads run
-            return quantum
+            return self._quantum(FAST_QUANTUM)
+        quantum = self._quantum(LONGEST_QUANTUM)
         wait = self.pacer.wait(time.monotonic(), quantum)
         if wait > 0.0:
             if self._requests:
@@ -190,6 +191,11 @@ class SimLoop(threading.Thread):
                 'behind the wall clock in all and does not make up for it'
             )
         return steps
+
+    def _quantum(self, longest: float) -> int:
+        """Return how many steps to make between two looks at the command topics."""
+        config = self._simulation.config
+        return max(1, min(config.steps_per_publish, round(longest / config.setup.step)))
 
     def _advance(self, steps: int, *, serve: bool) -> None:
         """Make steps, stopping at each where a command begins or ends or a message is due."""

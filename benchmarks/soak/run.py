@@ -1,0 +1,227 @@
+"""Fly for a day: is every throw flown, landed and told, and does nothing grow?
+
+    .venv/bin/python benchmarks/soak/run.py full [--hours 24]
+    .venv/bin/python benchmarks/soak/run.py real [--minutes 30]
+
+`full`: a throw every 5 simulated seconds, each in gusts of its own, as fast as the machine can;
+every landing is compared, to the last bit, with `fly_many` of the same launch, wind and seed.
+
+`real`: at rate 1, steered by 50 commands a second, recorded by recorder_node, with a participant
+that comes and goes every 10 s; at the end `analyse_bag --verify` flies the whole bag again.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+import csv
+from dataclasses import astuple, fields
+import json
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+from resources import Sample, growth, problems, sample
+from watcher import Watcher
+
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.air import Wind
+from disc_sim_ros.core.ensemble import fly_many
+from disc_sim_ros.core.flight import Setup
+from disc_sim_ros.nodes import live
+
+PERIOD = 5.0  # s from throw to throw; the flight of Fig. 5 takes 3.7
+GUSTS = 8.0  # % of the mean wind, as `wind.turbulence`
+MOST_DRIFT = 0.005  # s against the monotonic clock; a message is on its way for less
+WINDOW = 10.0  # s; the quickest message in it tells the offset of the clocks
+GUEST_EVERY = 10.0  # s
+START = 60.0  # s
+
+Values = dict[str, str]  # of an event
+
+PARAMETERS = {
+    'throw_period': PERIOD,
+    'start_time': 0.0,
+    'publish_rate': 50.0,
+    'wind.x': 2.0,
+    'wind.y': 1.0,
+    'wind.turbulence': GUSTS,
+}
+
+
+def main() -> int:
+    """Soak; return 0 where nothing was found."""
+    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
+    parser.add_argument('what', choices=('full', 'real'))
+    parser.add_argument('--hours', type=float, default=24.0, help='simulated, of full (24)')
+    parser.add_argument('--minutes', type=float, default=30.0, help='of real (30)')
+    parser.add_argument('--out', type=Path, default=Path(), help='folder for the samples (here)')
+    chosen = parser.parse_args()
+    with ExitStack() as stack:
+        domain = stack.enter_context(live.own_domain())
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='soak_')))
+        found = list(
+            full(stack, domain, folder, chosen.hours, chosen.out)
+            if chosen.what == 'full'
+            else real(stack, domain, folder, chosen.minutes, chosen.out)
+        )
+    print('\n'.join(f'FOUND: {problem}' for problem in found) or 'found nothing')
+    return 1 if found else 0
+
+
+def full(stack: ExitStack, domain: int, folder: Path, hours: float, out: Path) -> Iterator[str]:
+    """Throw as fast as possible, and yield what is wrong."""
+    watcher = Watcher(domain, steer=False)
+    stack.callback(watcher.close)
+    waiting = {**PARAMETERS, 'real_time_factor': 0.0, 'auto_throw': False, 'publish_rate': 10.0}
+    sim = stack.enter_context(live.started('sim_node', waiting, folder))
+    watcher.spin_until(lambda: 'sim_node' in watcher.told, START, 'sim_node')
+    watcher.call('sim_node/throw')
+    count, begun, samples = round(hours * 3600.0 / PERIOD), time.monotonic(), []
+    while len(watcher.named('landed')) < count:
+        sim.check()
+        samples.append(sample(sim.pid, time.monotonic() - begun))
+        watcher.spin(0.5)
+    took = time.monotonic() - begun
+    sim.end()
+    thrown, landed = watcher.named('thrown'), watcher.named('landed')[:count]
+    print(
+        f'{count} throws, {hours:g} h in {took:.0f} s: {hours * 3600.0 / took:.0f} times real time'
+    )
+    yield from flights(watcher, thrown, landed, count)
+    yield from differences(landed)
+    yield from resources(out, 'full', {'sim_node': samples})
+
+
+def real(stack: ExitStack, domain: int, folder: Path, minutes: float, out: Path) -> Iterator[str]:
+    """Throw, steer and record at rate 1, and yield what is wrong."""
+    watcher = Watcher(domain, steer=True)
+    stack.callback(watcher.close)
+    bag = folder / 'bag'
+    sim = stack.enter_context(
+        live.started('sim_node', {**PARAMETERS, 'auto_throw': False}, folder)
+    )
+    to = {'bag': str(bag), 'max_duration_s': 300.0}
+    recorder = stack.enter_context(live.started('recorder_node', to, folder))
+    watcher.spin_until(lambda: len(watcher.told) == 2, START, 'both nodes')
+    watcher.call('sim_node/throw')
+    processes = {'sim_node': sim, 'recorder_node': recorder}
+    samples: dict[str, list[Sample]] = {name: [] for name in processes}
+    begun = guest = time.monotonic()
+    while time.monotonic() < begun + minutes * 60.0:
+        for name, process in processes.items():
+            process.check()
+            samples[name].append(sample(process.pid, time.monotonic() - begun))
+        if time.monotonic() > guest + GUEST_EVERY:
+            guest = time.monotonic()
+            watcher.greet()
+        watcher.spin(1.0)
+    watcher.spin_until(lambda: in_balance(watcher), 2 * PERIOD, 'the last landing')
+    told = dict(watcher.told['sim_node'])
+    recorder.end()
+    sim.end()
+    thrown, landed = watcher.named('thrown'), watcher.named('landed')
+    print(f'{len(thrown)} throws in {minutes:g} min')
+    yield from flights(watcher, thrown, landed, len(thrown))
+    drifted, slipped = drift(watcher.offsets), float(told['slipped_s'])
+    worst = f'late at the last second by up to {float(told["worst_lateness_s"]) * 1e3:.1f} ms'
+    print(f'drift {drifted * 1e3:.2f} ms, of it told as slipped {slipped * 1e3:.2f} ms; {worst}')
+    print(f'missed deadlines {told["missed_deadlines"]}, slips {told["slips"]}')
+    if abs(drifted - slipped) > MOST_DRIFT:
+        yield f'time drifted by {drifted:.4f} s, {slipped:.4f} s of it told'
+    yield from verified(bag)
+    yield from resources(out, 'real', samples)
+
+
+def in_balance(watcher: Watcher) -> bool:
+    """Say whether all that was thrown has landed."""
+    return len(watcher.named('thrown')) == len(watcher.named('landed'))
+
+
+def flights(
+    watcher: Watcher,
+    thrown: Sequence[dict[str, str]],
+    landed: Sequence[Values],
+    count: int,
+) -> Iterator[str]:
+    """Yield throws and landings that are missing, and releases that are not when they are due."""
+    for name, events in (('thrown', thrown[:count]), ('landed', landed)):
+        numbers = [int(event['flight']) for event in events]
+        if numbers != list(range(1, count + 1)):
+            yield f'{name}: {len(set(range(1, count + 1)) - set(numbers))} of {count} not told of'
+    first = float(thrown[0]['stamp_s'])
+    for event in thrown:
+        late = float(event['stamp_s']) - first - PERIOD * (int(event['flight']) - 1)
+        if abs(late) > 1e-6:  # stamps of a float in seconds
+            yield f'flight {event["flight"]} was released {late:g} s late'
+    others = {name for name, _ in watcher.events} - {'thrown', 'landed', 'reset'}
+    if others:
+        yield f'events: {", ".join(sorted(others))}'
+
+
+def differences(landed: Sequence[Values]) -> Iterator[str]:
+    """Yield how many landings differ from those of the core."""
+    wind = Wind(mean=(2.0, -1.0, 0.0), turbulence=GUSTS)
+    setup = Setup(disc=catalogue.load('frisbee'), wind=wind, step=1e-3)
+    numbers = np.array([int(event['flight']) for event in landed])
+    core = fly_many({'speed': np.full(len(landed), 15.0)}, setup, seeds=numbers - 1)
+    names = ('flight_time_s', 'landing_x_m', 'landing_y_m')
+    told = np.array([[float(event[name]) for name in names] for event in landed])
+    same = (told == np.column_stack([core.time, core.x, core.y])).all(axis=1)
+    print(f'landings equal to those of fly_many to the last bit: {same.sum()} of {len(same)}')
+    if not same.all():
+        yield f'{(~same).sum()} landings differ from those of the core'
+
+
+def drift(offsets: Sequence[tuple[float, float]]) -> float:
+    """Return by how much simulated time fell behind the monotonic clock [s]."""
+    first, last = offsets[0][0] + WINDOW, offsets[-1][0] - WINDOW
+    return min(o for t, o in offsets if t > last) - min(o for t, o in offsets if t < first)
+
+
+def verified(bag: Path) -> Iterator[str]:
+    """Fly a bag again, and yield what differs."""
+    command = [
+        sys.executable,
+        '-m',
+        'disc_sim_ros.cli.analyse_bag',
+        str(bag),
+        '--verify',
+        '--json',
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        yield f'analyse_bag ended with {done.returncode}: {done.stderr.strip()}'
+        return
+    (disc,) = json.loads(done.stdout)['discs']
+    flown = [flight['verification']['re_flight'] for flight in disc['flights']]
+    missing = sum(flight['messages']['missing'] for flight in disc['flights'])
+    same = sum(f['exact'] and f['messages'] == f['identical_messages'] for f in flown)
+    size = sum(path.stat().st_size for path in bag.iterdir()) / 2**20
+    print(f'bag: {size:.0f} MiB, {same} of {len(flown)} flights identical to the last bit')
+    print(f'messages of odom missing: {missing}')
+    if same < len(flown) or missing:
+        yield f'the bag: {len(flown) - same} flights differ, {missing} messages are missing'
+
+
+def resources(out: Path, what: str, samples: dict[str, list[Sample]]) -> Iterator[str]:
+    """Write the samples, print what they say, and yield what grew."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name, taken in samples.items():
+        with (out / f'soak_{what}_{name}.csv').open('w', newline='') as file:
+            writer = csv.writer(file)
+            writer.writerow([field.name for field in fields(Sample)])
+            writer.writerows(map(astuple, taken))
+        first, last = taken[0], taken[-1]
+        print(
+            f'{name}: {first.memory:.1f} MiB at first, {last.memory:.1f} at last '
+            f'({growth(taken):+.2f} once settled); threads {first.threads}, {last.threads}; '
+            f'files {first.files}, {last.files}'
+        )
+        yield from problems(name, taken)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
