@@ -5,17 +5,14 @@ from collections.abc import Callable, Mapping, Sequence
 import gc
 import os
 import sys
-import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import try_shutdown
 from std_srvs.srv import Trigger
 
 from disc_sim_ros.bags.errors import BagError
@@ -23,7 +20,7 @@ from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.core.errors import ConfigError, DiscSimError
 from disc_sim_ros.nodes import parameters, recorder_status, topics
 from disc_sim_ros.nodes.bag_thread import LARGEST_BACKLOG, BagThread
-from disc_sim_ros.nodes.program import init, on_signal, plainly
+from disc_sim_ros.nodes.program import init, on_signal, plainly, serve
 from disc_sim_ros.nodes.recorder_config import RECORDER_TABLE, recorder_config
 from disc_sim_ros.nodes.recorder_topics import Listener, Topics
 from disc_sim_ros.nodes.track import Track
@@ -185,7 +182,7 @@ class RecorderNode(Node):
             held, self._held = self._held, {}
             for messages in held.values():
                 for track, data, _, sent in messages:
-                    self._deliver(track, data, time.time_ns(), sent)
+                    self._deliver(track, data, self._topics.clock.now(), sent)
         return 'recording'
 
     def _split(self) -> str:
@@ -211,6 +208,11 @@ class RecorderNode(Node):
         if self._waiting:
             self._topics.warn_once(
                 f'no /clock has come: {len(self._waiting)} messages wait for the time'
+            )
+        shift = self._topics.clock.shift
+        if shift:
+            self._topics.warn_once(
+                f'the wall clock was set by {shift * 1e-9:+.1f} s; log times go on without that'
             )
         tracks = self._topics.tracks.values()
         progress = recorder_status.Progress(
@@ -273,20 +275,13 @@ def main(args: Sequence[str] | None = None) -> int:
         sys.stderr.write(f'recorder_node: error: {plainly(error)}\n')
         try_shutdown()
         return 1 if isinstance(error, BagError) and not isinstance(error, ConfigError) else 2
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
     gc.collect()
     gc.freeze()  # a full collection would stall for tens of milliseconds
     node.start()
     try:
-        while not signals and node.is_working:
-            executor.spin_once(0.5)
-    except RCLError:
-        if ok():
-            raise
+        serve(node, lambda: not signals and node.is_working)
     finally:
         code = _finish(node)
-        executor.shutdown()
         node.destroy_node()
         try_shutdown()
     return code

@@ -13,6 +13,7 @@ from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.core.errors import DiscSimError
 from disc_sim_ros.nodes import offers
 from disc_sim_ros.nodes.bag_thread import BagThread
+from disc_sim_ros.nodes.log_clock import LogClock
 from disc_sim_ros.nodes.polled import Polled
 from disc_sim_ros.nodes.recorder_config import Selection
 from disc_sim_ros.nodes.track import Deliver, Track
@@ -26,6 +27,7 @@ class Topics:
     Attributes:
         lock: Held while messages are delivered and while it changes who hears them.
         tracks: What is recorded, by name; changed by `look` alone.
+        clock: By which messages arrive.
     """
 
     def __init__(
@@ -34,6 +36,7 @@ class Topics:
         """Find nothing yet; `look` does."""
         self.lock = threading.RLock()
         self.tracks: dict[str, Track] = {}
+        self.clock = LogClock()
         self._node = node
         self._log = node.get_logger()
         self._selection = selection
@@ -106,7 +109,9 @@ class Topics:
     def _begin(self, name: str, type_name: str, publishers: list[TopicEndpointInfo]) -> bool:
         """Subscribe to a topic; return whether that is possible."""
         try:
-            track = Track(self._node, name, type_name, self._group, self._deliver)
+            track = Track(
+                self._node, name, type_name, self._group, self._deliver, clock=self.clock
+            )
             self._listen(track, publishers)
         except ImportError as error:
             self._refuse(name, f'no type {type_name} here ({error})')

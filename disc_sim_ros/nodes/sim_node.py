@@ -9,14 +9,12 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import try_shutdown
 from std_srvs.srv import SetBool, Trigger
 
 from disc_sim_ros.core import simulator
@@ -26,7 +24,7 @@ from disc_sim_ros.nodes.channels import NodeMedium
 from disc_sim_ros.nodes.commands import Commands
 from disc_sim_ros.nodes.outputs import Outputs
 from disc_sim_ros.nodes.parameter_table import TABLE
-from disc_sim_ros.nodes.program import init, on_signal, plainly
+from disc_sim_ros.nodes.program import init, on_signal, plainly, serve
 from disc_sim_ros.nodes.sim_config import SimConfig, configuration
 from disc_sim_ros.nodes.sim_loop import SimLoop
 from disc_sim_ros.nodes.timeline import NANOSECONDS
@@ -199,19 +197,12 @@ def main(args: Sequence[str] | None = None) -> int:
         sys.stderr.write(f'sim_node: error: {plainly(error)}\n')
         try_shutdown()
         return 2
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
     node.start()
     try:
-        while not signals and node.loop.is_alive():
-            executor.spin_once(0.5)
-    except RCLError:
-        if ok():
-            raise
+        serve(node, lambda: not signals and node.loop.is_alive())
     finally:
         broken = not node.loop.is_alive()
         node.stop()
-        executor.shutdown()
         node.destroy_node()
         try_shutdown()
     return 1 if broken else 0

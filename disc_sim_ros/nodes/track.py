@@ -13,6 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.subscription import Subscription
 
 from disc_sim_ros.nodes import offers
+from disc_sim_ros.nodes.log_clock import LogClock
 from disc_sim_ros.nodes.polled import NO_EVENTS, Events, Polled, can_be_polled
 
 MOST_AT_ONCE = 256  # messages of one topic before the others have their turn
@@ -52,7 +53,14 @@ class Track:
     """
 
     def __init__(
-        self, node: Node, name: str, type_name: str, group: Polled, deliver: Deliver
+        self,
+        node: Node,
+        name: str,
+        type_name: str,
+        group: Polled,
+        deliver: Deliver,
+        *,
+        clock: LogClock,
     ) -> None:
         """Prepare to record; `listen` begins.
 
@@ -70,6 +78,7 @@ class Track:
         self._node = node
         self._group = group
         self._deliver = deliver
+        self._clock = clock
         self._expected: int | None = None  # the next number of the one publisher
         self._heard: _Heard | None = None
         self._qos: QoSProfile | None = None
@@ -129,7 +138,7 @@ class Track:
 
     def drain(self) -> None:
         """Take all that came before now."""
-        now = time.time_ns()
+        now = self._clock.now()
         for heard in self._all():
             self._take_from(heard, until=now)
 
@@ -161,15 +170,16 @@ class Track:
         take, kind = heard.subscription.handle.take_message, self._kind
         self._match(heard)
         missed, taken, received = self.missed, 0, 0
+        now = self._clock.now()
         found: tuple[bytes, dict[str, int]] | None = None
         while taken != most and received <= until:
             found = take(kind, True)  # noqa: FBT003 - raw; it knows no names
             if found is None:
                 break
             data, info = found
-            received = info['received_timestamp'] or time.time_ns()
+            received = self._clock.of(info['received_timestamp'] or time.time_ns())
             if not taken:
-                self.lateness = max(self.lateness, time.time_ns() - received)
+                self.lateness = max(self.lateness, now - received)
             taken += 1
             self._take(data, info, received)
         if self.missed > missed and self._match(heard):
@@ -188,7 +198,8 @@ class Track:
 
     def _take_one(self, data: bytes, info: dict[str, int]) -> None:
         """Take what the executor hands over, where messages cannot be polled."""
-        self._take(data, info, info['received_timestamp'] or time.time_ns())
+        self._clock.now()
+        self._take(data, info, self._clock.of(info['received_timestamp'] or time.time_ns()))
 
     def _take(self, data: bytes, info: dict[str, int], received: int) -> None:
         sent = info['source_timestamp']

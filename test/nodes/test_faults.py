@@ -1,0 +1,262 @@
+"""What happens around a node that runs for weeks must not reach the flight.
+
+Each flight is compared with the core's to the last bit, its stamps have to be even, and what the
+diagnostics tell has to be true. How quick the machine is, no test here asks.
+"""
+
+from itertools import pairwise
+import math
+import mmap
+from pathlib import Path
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+import pytest
+
+pytest.importorskip('rclpy')
+
+from nodes.recorder_process import Recorder
+from rclpy.context import Context
+from rclpy.node import Node
+
+from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.cli import analyse_bag
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.flight import Setup, fly
+from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.nodes import topics
+
+pytestmark = pytest.mark.ros
+
+HIGH = {'launch.height': 5.0, 'auto_throw': False, 'publish_rate': 200.0}  # a flight of 4.8 s
+PERIOD = 5_000_000  # ns
+HOUR = 3600
+EXPECTED = fly(Launch(height=5.0), Setup(disc=catalogue.load('frisbee')))
+
+
+def ns(message: bytes) -> int:
+    """The stamp of a serialised message that begins with a header."""
+    seconds, nanoseconds = struct.unpack_from('<iI', message, 4)
+    return seconds * 1_000_000_000 + nanoseconds
+
+
+class Flight:
+    """A flight under way, and what is heard of it."""
+
+    def __init__(self, ros, sim):
+        self.ros, self.sim = ros, sim
+        self.events = ros.listen(DiagnosticStatus, topics.FLIGHT_EVENTS)
+        self.odom = ros.listen(Odometry, topics.ODOM, raw=True)
+        self.diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+        self.told = {}
+        ros.spin_until(lambda: self.odom and self.diagnostics, 'the simulator')
+
+    def throw(self):
+        assert self.ros.call(self.sim, 'throw').success
+
+    def goes_on(self, seconds):
+        """Wait for so much more of simulated time."""
+        until = ns(self.odom[-1]) + seconds * 1e9
+        self.ros.spin_until(lambda: ns(self.odom[-1]) >= until, f'{seconds} s more')
+
+    def offset(self):
+        """Wait 0.5 s of simulated time; return by how much it is behind the steady clock [s]."""
+        least, seen = math.inf, len(self.odom)
+        until = ns(self.odom[-1]) + 0.5e9
+        while ns(self.odom[-1]) < until:
+            self.ros.spin_until(lambda old=seen: len(self.odom) > old, 'odom')
+            seen = len(self.odom)
+            least = min(least, time.monotonic() - ns(self.odom[-1]) * 1e-9)
+        return least
+
+    def tells(self):
+        """Wait for the next diagnostics, and return them."""
+        before = len(self.diagnostics)
+        self.ros.spin_until(lambda: len(self.diagnostics) > before, 'diagnostics')
+        status = self.diagnostics[-1].status[0]
+        return status, {pair.key: pair.value for pair in status.values}
+
+    def lands_as_computed(self, expected=EXPECTED, period=PERIOD):
+        """Wait for the landing; it is that of the core, and no stamp is missing or uneven."""
+        landed = []
+
+        def heard():
+            landed[:] = [e for e in self.events if e.name.endswith(': landed')]
+            return landed
+
+        self.ros.spin_until(heard, 'the landing', 60.0)
+        values = {pair.key: float(pair.value) for pair in landed[-1].values}
+        x, y, _ = expected.position
+        assert values['flight_time_s'] == expected.time
+        assert (values['landing_x_m'], values['landing_y_m']) == (x, y)
+        stamps = [ns(message) for message in self.odom]
+        assert {b - a for a, b in pairwise(stamps)} <= {period, 0}  # 0: shown again at a throw
+
+
+@pytest.fixture
+def start(ros):
+    """A function that starts a simulator and what listens to it."""
+
+    def started(**more):
+        return Flight(ros, ros.start(HIGH | more))
+
+    return started
+
+
+def memory(pid: int) -> float:
+    """Resident set of a process [MiB]."""
+    pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
+    return pages * mmap.PAGESIZE / 2**20
+
+
+def open_files(pid: int) -> int:
+    return sum(1 for _ in Path(f'/proc/{pid}/fd').iterdir())
+
+
+def test_a_stopped_process_flies_on_exactly_and_tells_how_long_it_stood(start):
+    flight = start()
+    flight.throw()
+    before, slipped = flight.offset(), float(flight.tells()[1]['slipped_s'])
+    process = flight.sim.process
+    for stopped in (0.05, 0.5):
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(stopped)
+        process.send_signal(signal.SIGCONT)
+        status, values = flight.tells()
+        while float(values['worst_lateness_s']) < 0.8 * stopped:  # it may have been on its way
+            status, values = flight.tells()
+        assert status.level == DiagnosticStatus.WARN
+        assert 'ms late' in status.message
+    behind, (_, values) = flight.offset() - before, flight.tells()
+    assert behind > 0.3  # of 0.5 s, all but 0.1 s are given up
+    # What the messages show is what the diagnostics tell; a message takes less than 50 ms.
+    assert float(values['slipped_s']) - slipped == pytest.approx(behind, abs=0.05)
+    assert 'does not make up for it' in flight.sim.stderr
+    flight.lands_as_computed()
+
+
+@pytest.fixture
+def wall_clock(tmp_path, monkeypatch):
+    """A function that shifts the wall clock [s] of the processes started from now on."""
+    compiler = shutil.which('cc') or shutil.which('gcc')
+    if compiler is None:
+        pytest.skip('no C compiler')
+    library, shift = tmp_path / 'clock_shim.so', tmp_path / 'shift'
+    source = Path(__file__).with_name('clock_shim.c')
+    subprocess.run([compiler, '-shared', '-fPIC', '-O1', '-o', library, source], check=True)
+    shift.write_bytes(bytes(8))
+    monkeypatch.setenv('LD_PRELOAD', str(library))
+    monkeypatch.setenv('CLOCK_SHIFT', str(shift))
+    python = [sys.executable, '-c', 'import time; print(time.time(), time.monotonic())']
+
+    def shifted(seconds):
+        with shift.open('r+b') as file:
+            file.write(struct.pack('<q', seconds))
+
+    def read_there():
+        there = subprocess.run(python, capture_output=True, check=True, text=True).stdout.split()
+        return float(there[0]) - time.time(), float(there[1]) - time.monotonic()
+
+    shifted(HOUR)
+    wall, steady = read_there()
+    assert wall == pytest.approx(HOUR, abs=30.0)  # the shim is at work, on this clock alone
+    assert steady == pytest.approx(0.0, abs=30.0)
+    shifted(0)
+    return shifted
+
+
+def test_the_wall_clock_may_be_set_while_it_flies_and_is_recorded(
+    ros, start, wall_clock, tmp_path, capsys
+):
+    flight = start()
+    recorder = Recorder(ros, tmp_path / 'bag', {})
+    recorder.listens_to('/odom', '/flight_events', '/configuration', '/release')
+    first = len(flight.odom)
+    flight.throw()
+    for seconds in (HOUR, -HOUR, 0):
+        flight.goes_on(0.4)
+        wall_clock(seconds)
+        flight.tells()  # once a second by the steady clock, whatever time it is
+        flight.tells()
+    flight.lands_as_computed()
+    recorder.wait_for('the wall clock was set by +3600.0 s; log times go on')
+    assert recorder.end() == 0
+    bag = open_bag(recorder.bag)
+    assert bag.complete
+    recorded = {m.data for m in bag.raw(['/odom'])}
+    assert recorded >= set(flight.odom[first:])
+    assert analyse_bag.main([str(recorder.bag), '--verify']) == 0
+    assert 'identical to the last bit' in capsys.readouterr().out
+
+
+NEVER_READS = """
+import rclpy
+from nav_msgs.msg import Odometry
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import QoSProfile, HistoryPolicy
+rclpy.init()
+node = rclpy.create_node('sleeper')
+for kind, name in ((Odometry, 'odom'), (PoseStamped, 'pose')):
+    node.create_subscription(kind, name, print, QoSProfile(history=HistoryPolicy.KEEP_ALL))
+input()
+"""
+
+
+def test_subscribers_that_never_read_cost_neither_flight_nor_memory(start, request):
+    flight = start(physics_rate=2000.0, publish_rate=2000.0)
+    sleepers = [
+        subprocess.Popen([sys.executable, '-c', NEVER_READS], stdin=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    for sleeper in sleepers:
+        request.addfinalizer(sleeper.communicate)
+        request.addfinalizer(sleeper.kill)
+    node, pid = flight.ros.node, flight.sim.process.pid
+    flight.ros.spin_until(lambda: node.count_subscribers('pose') == 2, 'the sleepers')
+    for sleeper in sleepers:
+        sleeper.send_signal(signal.SIGSTOP)
+    flight.throw()
+    flight.goes_on(1.5)
+    before = memory(pid)
+    flight.goes_on(3.0)
+    # 6,000 messages of 0.7 and 0.1 kB are 5 MB, which a history for the sleepers would hold.
+    assert memory(pid) - before < 2.0
+    expected = fly(Launch(height=5.0), Setup(disc=catalogue.load('frisbee'), step=1.0 / 2000.0))
+    flight.lands_as_computed(expected, 500_000)
+
+
+def test_peers_that_come_and_go_and_parameters_set_all_the_time_change_nothing(ros, start):
+    flight = start()
+    pid = flight.sim.process.pid
+
+    def visit():
+        context = Context()
+        context.init(args=[])
+        guest = Node('guest', context=context, start_parameter_services=False)
+        guest.create_subscription(Odometry, topics.ODOM, print, topics.STATE_QOS)
+        publisher = guest.create_publisher(Odometry, topics.THROW, topics.COMMAND_QOS)
+        ros.spin_until(publisher.get_subscription_count, 'the simulator')
+        guest.destroy_node()
+        context.try_shutdown()
+
+    visit()
+    before = open_files(pid)
+    flight.throw()
+    for n in range(12):
+        visit()
+        assert ros.set(flight.sim, {'launch.speed': 10.0 + n, 'path_rate': 5.0 + n}).successful
+        refused = ros.set(flight.sim, {'launch.speed': 20.0, 'publish_rate': 300.0})
+        assert not refused.successful
+        assert 'publish_rate' in refused.reason
+    flight.lands_as_computed()
+    ros.spin_until(lambda: open_files(pid) <= before, 'sockets of those who left to be closed')
+    assert ros.call(flight.sim, 'throw').success
+    ros.spin_until(lambda: flight.events[-1].name.endswith(': thrown'), 'the next throw')
+    thrown = {pair.key: pair.value for pair in flight.events[-1].values}
+    assert float(thrown['speed_m_s']) == pytest.approx(21.0)
