@@ -45,6 +45,7 @@ PARAMETERS = {
     'throw_period': PERIOD,
     'start_time': 0.0,
     'publish_rate': 50.0,
+    'command_timeout': PERIOD,  # who commands here also makes guests, which takes a while
     'wind.x': 2.0,
     'wind.y': 1.0,
     'wind.turbulence': GUSTS,
