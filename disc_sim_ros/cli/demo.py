@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+import shutil
 import signal
 import sys
 import tempfile
@@ -242,22 +243,32 @@ def _report(bag: Path, plot: Path) -> int:
         f'  {bag}',
         f'  {plot}',
         'to look at it',
-        f'  analyse_bag --verify {bag}',
-        f'  ros2 bag play {bag}',
+        f'  {_beside_this()}analyse_bag --verify {bag}',
+        f'  ros2 bag play {bag}    (in an installation of ROS 2)',
         f'  Foxglove: open {opened.files[0]} with the layout {_layout()}',
     ]
     output.show('\n'.join(lines))
     return 0 if all(map(bag_report.passed, analyses)) else DIFFERENT
 
 
+def _beside_this() -> str:
+    """Return what to put before the name of a program: its folder, unless a shell finds it."""
+    folder = Path(sys.executable).parent
+    found = shutil.which('analyse_bag')
+    return '' if found and Path(found).parent == folder else f'{_short(folder)}/'
+
+
 def _layout() -> Path:
-    """Return where the layout for Foxglove is, as short as can be."""
+    """Return where the layout for Foxglove is."""
     name = Path('config', 'foxglove_layout.json')
     source = Path(disc_sim_ros.__file__).parents[1] / name
-    if source.is_file():
-        here = Path.cwd()
-        return source.relative_to(here) if source.is_relative_to(here) else source
-    return Path(sys.prefix, 'share', 'disc_sim_ros', name)
+    return _short(source) if source.is_file() else Path(sys.prefix, 'share', 'disc_sim_ros', name)
+
+
+def _short(path: Path) -> Path:
+    """Return a path as short as can be, from here."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 if __name__ == '__main__':

@@ -267,8 +267,8 @@ def _numbers(flag: str, text: str, value: str, count: int, form: str) -> tuple[f
     return found
 
 
-def note_compilation(prog: str) -> None:
+def note_compilation(prog: str, setup: flight.Setup) -> None:
     """Say that the first run on a machine takes longer."""
-    if not ensemble.is_ready():
+    if not ensemble.is_ready(setup):
         text = 'compiling the equations of motion, once on this machine, about 15 s'
         sys.stderr.write(f'{prog}: note: {text}\n')

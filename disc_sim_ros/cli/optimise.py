@@ -181,7 +181,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> None:
     posed = problem(chosen, words)
     from disc_sim_ros.analysis.ensembles import optimise, optimise_texts  # noqa: PLC0415
 
-    ensemble_flags.note_compilation('optimise')
+    ensemble_flags.note_compilation('optimise', posed.question.setup)
     found = optimise.optimise(posed, seed=chosen.seed)
     again = optimise_texts.command(found, chosen.disc)
     if plot is not None:

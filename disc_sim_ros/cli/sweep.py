@@ -141,7 +141,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str], bar: ProgressBar) -> 
     from disc_sim_ros.analysis.ensembles import run, summary, texts  # noqa: PLC0415
     from disc_sim_ros.analysis.ensembles.executors import opened  # noqa: PLC0415
 
-    ensemble_flags.note_compilation('sweep')
+    ensemble_flags.note_compilation('sweep', asked.setup)
     started = time.monotonic()
     with opened(chosen.executor, getattr(chosen, 'workers', None)) as (executor, workers):
         path = run.sweep(

@@ -1,6 +1,6 @@
 """Many flights at once: those of `flight.fly`, side by side in vector registers, on all cores."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 import math
@@ -152,9 +152,14 @@ def fly_many(
     return found
 
 
-def is_ready() -> bool:
-    """Say whether `fly_many` needs no compilation first."""
-    return is_compiled(fly_lanes) and is_compiled(fly_rows)
+def is_ready(setup: Setup) -> bool:
+    """Say whether `fly_many` needs no compilation first: gusts have a kernel of their own."""
+    return is_compiled(_kernel(gusts=setup.wind.turbulence > 0.0))
+
+
+def _kernel(*, gusts: bool) -> Callable[..., None]:
+    """Return what flies: side by side, but one by one in gusts and in plain Python."""
+    return fly_lanes if COMPILED and not gusts else fly_rows
 
 
 @dataclass(frozen=True)
@@ -170,8 +175,7 @@ class _Fixed:
     def fly(self, rows: FloatArray, start: int, noise: FloatArray) -> None:
         """Fly all rows, the first of which is flight `start`: side by side if without gusts."""
         setup, found = self.setup, self.found
-        together = len(noise) == 0 and COMPILED
-        (fly_lanes if together else fly_rows)(
+        _kernel(gusts=len(noise) > 0)(
             rows,
             start,
             setup.plant,

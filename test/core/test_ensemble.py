@@ -286,3 +286,10 @@ def test_an_interrupt_stops_it_soon():
         # A chunk is 0.1 s or so of one core; the rest of the bound is for a busy machine.
         assert time.monotonic() - start < 5.0
     assert 'KeyboardInterrupt' in errors
+
+
+@pytest.mark.parametrize('turbulence', [0.0, 5.0])
+def test_it_is_ready_once_it_has_flown(turbulence):
+    setup = Setup(disc=FRISBEE, step=0.02, wind=Wind(turbulence=turbulence))
+    fly_many({}, setup, duration=0.1)
+    assert ensemble.is_ready(setup)

@@ -187,7 +187,7 @@ def test_the_pilot_lands_a_disc_at_a_target_in_wind_that_it_does_not_know(
 
 
 def test_steer_to_target_ends_with_a_bag_and_a_plot_within_a_metre(tmp_path):
-    options = ('--target', '26', '0', '--roll', '10', '--wind', '0', '3', '0', '--pace', '0.4')
+    options = ('--target', '26', '0', '--roll', '10', '--wind', '0', '3', '0', '--pace', '0.25')
     output = run('steer_to_target.py', *options, '--folder', str(tmp_path / 'x'))
     assert 'identical to the last bit' in output
     assert (tmp_path / 'x/flight.png').stat().st_size > 10_000
