@@ -29,14 +29,13 @@ TARGETS = {
 }
 SLOWEST = 20  # s for one input; slower is a hang
 _MEMORY = 2048  # MB
-# numba compiles these: instrumented they would be no longer what flies.
+CORE = Path(__file__).parents[2] / 'disc_sim_ros' / 'core'
+# numba compiles what is in these: instrumented it would be no longer what flies.
 COMPILED = tuple(
-    f'disc_sim_ros.core.{name}'
-    for name in (
-        'aerodynamics', 'axes', 'derived', 'ensemble', 'equations', 'integration', 'rk4',
-        'turbulence', '_jit',
-    )
-)  # fmt: skip
+    f'disc_sim_ros.core.{path.stem}'
+    for path in CORE.glob('*.py')
+    if re.search('_jit|_vectors|numba', path.read_text(encoding='utf-8'))
+)
 INSTRUMENTED = ('disc_sim_ros', 'mcap', 'mcap_ros2')  # and what a target names beside
 MORE_INSTRUMENTED = {'disc_files': ('yaml',)}  # it makes all else ten times slower
 LONGEST = 1 << 20  # bytes of an input
