@@ -1,7 +1,7 @@
 # Targets of one line; the work is in tools/. PYTHON=... chooses the interpreter for .venv.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test test lint fly bench bench-flights fuzz clean
+.PHONY: help setup setup-test test lint fly bench bench-flights bench-steps fuzz clean
 
 # A sourced ROS installation must not mix with the ROS in .venv, and a Python started by the ROS
 # wheels hands down a guard that would keep those of .venv from starting.
@@ -10,6 +10,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH PYTHONHOME PYTHONPATH
 BIN := .venv/bin
 DISC ?=
 THROW ?=
+PEERS ?=
 export PYTHON
 
 help: ## list the targets
@@ -41,9 +42,11 @@ fly: setup ## throw a disc in real time, record and plot it (DISC=wraith THROW='
 bench-flights: setup-test ## measure flights per second
 	@$(BIN)/python benchmarks/flights.py
 
-bench: setup-test ## measure flights, ensembles, node, bags and recorder; some minutes, on a quiet machine
-	@for name in flights ensemble peers node bag_writer bag_killed recorder; do \
-		echo "== benchmarks/$$name.py"; $(BIN)/python benchmarks/$$name.py || exit 1; done
+bench-steps: setup-test ## draw the error over the step, in despun axes and in spinning ones
+	@$(BIN)/python benchmarks/steps.py --write
+
+bench: setup-test ## measure everything beside its peers, 6 minutes; writes the tables of docs/ and README
+	@$(BIN)/python benchmarks/run.py --write $(if $(PEERS),--peers '$(PEERS)')
 
 fuzz: setup-test ## fuzz every input, 10 minutes each (after .venv/bin/pip install -e .[fuzz])
 	@nice -n 19 $(BIN)/python benchmarks/fuzz/run.py all --seconds 600

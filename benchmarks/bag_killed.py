@@ -1,8 +1,7 @@
 """How much a killed recorder loses, with messages at 1 kHz and a flush every 0.5 s.
 
 Writers are killed (SIGKILL) at random moments; the loss is the time from the last message on the
-disk to the last one that the writer had taken. Then each bag is repaired. The last line is the
-worst loss.
+disk to the last one that the writer had taken. Then each bag is repaired.
 
 usage: benchmarks/bag_killed.py [FOLDER]   (a folder on the disk to measure with; default: here)
 """
@@ -15,6 +14,8 @@ import sys
 import tempfile
 import time
 
+from lines import Line, print_lines
+
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
 
@@ -22,14 +23,19 @@ CHILD = Path(__file__).parents[1] / 'test/bags/killed.py'
 KILLS = 24
 AT_ONCE = 3
 FLUSH_PERIOD = 0.5  # s
+MOST = 1.0  # s lost
 RATE = 1000  # Hz
 LONGEST = 2.0  # s that a writer lives after its first flush
 
 
 def main() -> None:
-    """Kill, measure, repair and print."""
+    """Print what was measured."""
+    print_lines(lines(Path(sys.argv[1]) if len(sys.argv) > 1 else Path()))
+
+
+def lines(parent: Path = Path()) -> tuple[Line, ...]:
+    """Kill, measure and repair on the disk of a folder."""
     rng = random.Random(1)  # noqa: S311 - not for secrets
-    parent = Path(sys.argv[1]) if len(sys.argv) > 1 else Path()
     losses, repairs = [], []
     with tempfile.TemporaryDirectory(dir=parent) as scratch:
         for first in range(0, KILLS, AT_ONCE):
@@ -44,7 +50,18 @@ def main() -> None:
                 assert report.message_count == open_bag(report.target).message_count  # noqa: S101
     print(f'{KILLS} kills, {RATE} messages a second, flushed every {FLUSH_PERIOD} s')
     print(f'repaired in {statistics.median(repairs):.3f} s of CPU time each (median)')
-    print(f'lost: median {statistics.median(losses):.2f} s, worst {max(losses):.2f} s')
+    worst = max(losses)
+    return (
+        Line(
+            what=f'what {KILLS} killed recorders lost',
+            ours=f'median {statistics.median(losses):.2f} s, worst {worst:.2f} s',
+            beside=f'flushed every {FLUSH_PERIOD} s',
+            ratio=worst / FLUSH_PERIOD,
+            bound=f'at most {MOST:g} s',
+            kept=worst <= MOST,
+            short=True,
+        ),
+    )
 
 
 def kill(folders: list[Path], life: float) -> None:

@@ -14,6 +14,8 @@ import math
 import sys
 import time
 
+from lines import Line, number, print_lines
+
 from disc_sim_ros.core import catalogue
 from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
@@ -72,27 +74,40 @@ def frispy(inertia: float = 1.0, **solver: float) -> Callable[[], Point]:
 
 
 def main() -> None:
-    """Measure and print."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
+    """Print what was measured."""
+    print_lines(lines(float(sys.argv[1]) if len(sys.argv) > 1 else 3.0))
+
+
+def lines(seconds: float = 3.0) -> tuple[Line, ...]:
+    """Measure each simulator for some CPU seconds."""
     mine = rate(ours(0.02), seconds)
     error = math.dist(ours(0.02)(), ours(1e-4)())
     light = {'inertia_axial_kg_m2': 2.4e-3 * 10, 'inertia_diametral_kg_m2': 1.2e-3 * 10}
     moved = math.dist(ours(0.02, **light)(), ours(0.02)())
-    print(f'disc_sim_ros, 20 ms step: {mine:.0f} flights per CPU-second, {error * 1e3:.3f} mm off')
-    print(f'  ten times the inertia moves the end by {moved:.2f} m')
+    own = f'{number(mine)} per CPU-second, {number(error * 1e3, 1)} mm off'
+    absent = Line(what='3 s flights', ours=own, beside='shotshaper: not on PyPI, not measured')
     try:
         theirs = rate(frispy(), seconds)
     except ImportError:
-        print('FrisPy: not installed (pip install FrisPy), skipped')
-    else:
-        error = math.dist(frispy()(), frispy(rtol=1e-10, atol=1e-10)())
-        moved = math.dist(frispy(inertia=10.0)(), frispy()())
-        print(
-            f'FrisPy, its defaults: {theirs:.0f} flights per CPU-second, {error * 1e3:.1f} mm off'
-        )
-        print(f'  ten times the inertia moves the end by {moved:.2f} m')
-        print(f'ratio: {mine / theirs:.0f}')
-    print('shotshaper: not on PyPI, skipped')
+        skipped = 'FrisPy: not installed (see benchmarks/peers.py), not measured'
+        return (Line(what='3 s flights', ours=own, beside=skipped), absent)
+    off = math.dist(frispy()(), frispy(rtol=1e-10, atol=1e-10)())
+    budged = math.dist(frispy(inertia=10.0)(), frispy()())
+    return (
+        Line(
+            what='3 s flights',
+            ours=own,
+            beside=f'FrisPy {number(theirs)}, {number(off * 1e3, 1)} mm off',
+            ratio=mine / theirs,
+            short=True,
+        ),
+        Line(
+            what='ten times the inertia moves the end',
+            ours=f'by {moved:.2f} m',
+            beside=f'FrisPy by {budged:.2f} m',
+        ),
+        absent,
+    )
 
 
 if __name__ == '__main__':

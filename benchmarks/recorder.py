@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 
+from lines import Line, number, print_lines
 from mcap.writer import Writer
 from nav_msgs.msg import Odometry
 import rclpy
@@ -35,6 +36,7 @@ TYPE = 'nav_msgs/msg/Odometry'
 NUMBER = struct.Struct('<d')
 TICKS = os.sysconf('SC_CLK_TCK')
 PAGE = os.sysconf('SC_PAGE_SIZE')
+LEAST = 0.5  # of the rate of mcap.Writer alone
 
 
 def odometry() -> Odometry:
@@ -64,8 +66,8 @@ def publish(seconds: float) -> None:
     begun, n = time.monotonic(), 0
     while n < seconds * RATE:
         due = min(round((time.monotonic() - begun) * RATE), round(seconds * RATE))
-        for number in range(n, due):
-            publisher.publish(pack(0, 0, float(number), *rest))
+        for i in range(n, due):
+            publisher.publish(pack(0, 0, float(i), *rest))
         n = max(n, due)
         time.sleep(BURST)
     print(f'{n / (time.monotonic() - begun):.0f}', flush=True)
@@ -160,14 +162,17 @@ def written(messages: int, folder: Path) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Print what was measured, or be one of its processes."""
     if sys.argv[1:2] == ['publish']:
         publish(float(sys.argv[2]))
-        return
-    if sys.argv[1:2] == ['plain']:
+    elif sys.argv[1:2] == ['plain']:
         record_plainly(sys.argv[2])
-        return
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
+    else:
+        print_lines(lines(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0))
+
+
+def lines(seconds: float = 60.0) -> tuple[Line, ...]:
+    """Record for some time, and write as much as can be written."""
     with tempfile.TemporaryDirectory() as scratch, live.own_domain():
         folder = Path(scratch)
         total = round(seconds * RATE)
@@ -176,24 +181,47 @@ def main() -> None:
         share, memory, rate = measured(ours, seconds)
         bag = open_bag(folder / 'bag')
         found = numbers(lambda: bag.raw(['/odom']))
-        kept = 'in order' if found == list(range(total)) else 'NOT ALL, OR NOT IN ORDER'
+        whole = found == list(range(total))
         print(f'published {total} messages at {rate:.0f} Hz')
-        print(
-            f'recorder_node: {len(found)} recorded, {kept}; {share:.1%} of a core; memory', end=''
-        )
-        print(f' {", ".join(f"{m:.0f}" for m in memory)} MB over the time')
         plain = [sys.executable, __file__, 'plain', str(folder / 'plain.mcap')]
         plain_share, _, _ = measured(plain, min(seconds, 10.0))
-        total = round(min(seconds, 10.0) * RATE)
-        count = len(numbers(lambda: open_bag(folder / 'plain.mcap').raw(['/odom'])))
-        print(f'plain callback: {count} of {total} recorded, {count / total:.1%}', end='')
-        print(f'; {plain_share:.1%} of a core')
+        sent = round(min(seconds, 10.0) * RATE)
+        kept = len(numbers(lambda: open_bag(folder / 'plain.mcap').raw(['/odom'])))
         writer = alone(100_000, folder / 'alone.mcap')
-        print(f'messages per CPU-second: mcap.Writer alone {writer:.0f}')
         own = written(100_000, folder / 'written')
-        print(f'  the writing thread of recorder_node {own:.0f}, {own / writer:.2f} of it')
-        whole = rate / share
-        print(f'  recorder_node with ROS and network {whole:.0f}, {whole / writer:.2f} of it')
+    told = 'all, in order' if whole else 'NOT ALL, OR NOT IN ORDER'
+    all_of_it = rate / share
+    return (
+        Line(
+            what=f'`recorder_node`, {RATE:,} Odometry a second for {seconds:g} s',
+            ours=f'{len(found):,} of {total:,}, {told}',
+            beside=f'a plain callback {kept / sent:.0%}',
+            ratio=len(found) / total / (kept / sent),
+            bound='nothing lost',
+            kept=whole,
+            short=True,
+        ),
+        Line(
+            what='the same, CPU',
+            ours=f'{share:.0%} of a core, {max(memory):.0f} MB',
+            beside=f'a plain callback {plain_share:.0%}',
+            ratio=plain_share / share,
+        ),
+        Line(
+            what='its writing thread, Odometry',
+            ours=f'{number(own)} per CPU-second',
+            beside=f'`mcap.Writer` alone {number(writer)}',
+            ratio=own / writer,
+            bound=f'at least {LEAST:g} times',
+            kept=own / writer >= LEAST,
+        ),
+        Line(
+            what='all of it, with ROS and network',
+            ours=f'{number(all_of_it)} per CPU-second',
+            beside=f'`mcap.Writer` alone, no network {number(writer)}',
+            ratio=all_of_it / writer,
+        ),
+    )
 
 
 if __name__ == '__main__':

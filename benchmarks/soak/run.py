@@ -2,12 +2,15 @@
 
     .venv/bin/python benchmarks/soak/run.py full [--hours 24]
     .venv/bin/python benchmarks/soak/run.py real [--minutes 30]
+    .venv/bin/python benchmarks/soak/run.py crowd [--minutes 2]
 
 `full`: a throw every 5 simulated seconds, each in gusts of its own, as fast as the machine can;
 every landing is compared, to the last bit, with `fly_many` of the same launch, wind and seed.
 
 `real`: at rate 1, steered by 50 commands a second, recorded by recorder_node, with a participant
 that comes and goes every 10 s; at the end `analyse_bag --verify` flies the whole bag again.
+
+`crowd`: ten simulators in one domain, each with a throw of its own; each is stopped once for 5 s.
 """
 
 import argparse
@@ -16,7 +19,9 @@ from contextlib import ExitStack
 import csv
 from dataclasses import astuple, fields
 import json
+import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 import tempfile
@@ -29,7 +34,8 @@ from watcher import Watcher
 from disc_sim_ros.core import catalogue
 from disc_sim_ros.core.air import Wind
 from disc_sim_ros.core.ensemble import fly_many
-from disc_sim_ros.core.flight import Setup
+from disc_sim_ros.core.flight import Setup, fly
+from disc_sim_ros.core.launch import Launch
 from disc_sim_ros.nodes import live
 
 PERIOD = 5.0  # s from throw to throw; the flight of Fig. 5 takes 3.7
@@ -38,6 +44,8 @@ MOST_DRIFT = 0.005  # s against the monotonic clock; a message is on its way for
 WINDOW = 10.0  # s; the quickest message in it tells the offset of the clocks
 GUEST_EVERY = 10.0  # s
 START = 60.0  # s
+CROWD = 10
+STOP = 5.0  # s
 
 Values = dict[str, str]  # of an event
 
@@ -55,26 +63,28 @@ PARAMETERS = {
 def main() -> int:
     """Soak; return 0 where nothing was found."""
     parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
-    parser.add_argument('what', choices=('full', 'real'))
+    parser.add_argument('what', choices=('full', 'real', 'crowd'))
     parser.add_argument('--hours', type=float, default=24.0, help='simulated, of full (24)')
-    parser.add_argument('--minutes', type=float, default=30.0, help='of real (30)')
+    parser.add_argument('--minutes', type=float, help='of real (30) and crowd (2)')
     parser.add_argument('--out', type=Path, default=Path(), help='folder for the samples (here)')
     chosen = parser.parse_args()
     with ExitStack() as stack:
         domain = stack.enter_context(live.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='soak_')))
-        found = list(
-            full(stack, domain, folder, chosen.hours, chosen.out)
-            if chosen.what == 'full'
-            else real(stack, domain, folder, chosen.minutes, chosen.out)
-        )
+        place = stack, domain, folder
+        if chosen.what == 'full':
+            found = list(full(*place, chosen.hours, chosen.out))
+        elif chosen.what == 'real':
+            found = list(real(*place, chosen.minutes or 30.0, chosen.out))
+        else:
+            found = list(crowd(*place, chosen.minutes or 2.0, chosen.out))
     print('\n'.join(f'FOUND: {problem}' for problem in found) or 'found nothing')
     return 1 if found else 0
 
 
 def full(stack: ExitStack, domain: int, folder: Path, hours: float, out: Path) -> Iterator[str]:
     """Throw as fast as possible, and yield what is wrong."""
-    watcher = Watcher(domain, steer=False)
+    watcher = Watcher(domain)
     stack.callback(watcher.close)
     waiting = {**PARAMETERS, 'real_time_factor': 0.0, 'auto_throw': False, 'publish_rate': 10.0}
     sim = stack.enter_context(live.started('sim_node', waiting, folder))
@@ -134,6 +144,49 @@ def real(stack: ExitStack, domain: int, folder: Path, minutes: float, out: Path)
         yield f'time drifted by {drifted:.4f} s, {slipped:.4f} s of it told'
     yield from verified(bag)
     yield from resources(out, 'real', samples)
+
+
+def crowd(stack: ExitStack, domain: int, folder: Path, minutes: float, out: Path) -> Iterator[str]:
+    """Throw ten discs side by side, stop each once, and yield what is wrong."""
+    speeds = {f'/disc_{n}': 12.0 + 0.5 * n for n in range(CROWD)}
+    watcher = Watcher(domain, namespaces=list(speeds))
+    stack.callback(watcher.close)
+    sims = {}
+    for space, speed in speeds.items():
+        own = folder / space[1:]
+        own.mkdir()
+        parameters = {'launch.speed': speed, 'throw_period': PERIOD, 'publish_rate': 50.0}
+        place = ('-r', f'__ns:={space}')
+        sims[space] = stack.enter_context(live.started('sim_node', parameters, own, *place))
+    watcher.spin_until(lambda: len(watcher.told) == CROWD, START, 'all simulators')
+    samples: dict[str, list[Sample]] = {space: [] for space in sims}
+    begun = time.monotonic()
+    while time.monotonic() < begun + minutes * 60.0 - CROWD * STOP:
+        for space, sim in sims.items():
+            sim.check()
+            samples[space].append(sample(sim.pid, time.monotonic() - begun))
+        watcher.spin(1.0)
+    for sim in sims.values():
+        os.kill(sim.pid, signal.SIGSTOP)
+        watcher.spin(STOP)
+        os.kill(sim.pid, signal.SIGCONT)
+    watcher.spin(2 * PERIOD)
+    slipped = [float(values['slipped_s']) for values in watcher.told.values()]
+    if min(slipped) < STOP - 1.0:
+        yield f'stopped for {STOP:g} s, told of {min(slipped):.2f} s'
+    count = 0
+    for space, speed in speeds.items():
+        flight = fly(Launch(speed=speed), Setup(disc=catalogue.load('frisbee')))
+        expected = (flight.time, *flight.position[:2])
+        landed = watcher.named(f'{space}landed')
+        names = ('flight_time_s', 'landing_x_m', 'landing_y_m')
+        same = sum(tuple(float(one[name]) for name in names) == expected for one in landed)
+        numbers = [int(one['flight']) for one in landed]
+        count += same
+        if same < len(landed) or numbers != list(range(numbers[0], numbers[0] + len(landed))):
+            yield f'{space}: {len(landed) - same} landings differ, or one is missing: {numbers}'
+    print(f'{CROWD} simulators, {count} landings as fly has them, to the last bit')
+    yield from resources(out, 'crowd', samples)
 
 
 def releases(watcher: Watcher, thrown: Sequence[Values], count: int) -> Iterator[str]:
@@ -205,7 +258,7 @@ def resources(out: Path, what: str, samples: dict[str, list[Sample]]) -> Iterato
     """Write the samples, print what they say, and yield what grew."""
     out.mkdir(parents=True, exist_ok=True)
     for name, taken in samples.items():
-        with (out / f'soak_{what}_{name}.csv').open('w', newline='') as file:
+        with (out / f'soak_{what}_{name.strip("/")}.csv').open('w', newline='') as file:
             writer = csv.writer(file)
             writer.writerow([field.name for field in fields(Sample)])
             writer.writerows(map(astuple, taken))

@@ -1,6 +1,7 @@
 """A node that hears what becomes of every throw, and how time passes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 import math
 import time
 
@@ -29,12 +30,14 @@ class Watcher:
     """Hears events, diagnostics and odom; steers where asked to.
 
     Attributes:
-        events: (name, values) of each event, in order.
+        events: (name, values) of each event, in order; a name has the namespace in front.
         told: The newest values of the diagnostics of each node.
         offsets: (monotonic time, that minus the stamp of odom) [s], of what came.
     """
 
-    def __init__(self, domain: int, *, steer: bool) -> None:
+    def __init__(
+        self, domain: int, *, steer: bool = False, namespaces: Sequence[str] = ('',)
+    ) -> None:
         """Join the domain."""
         self.events: list[tuple[str, dict[str, str]]] = []
         self.told: dict[str, dict[str, str]] = {}
@@ -45,7 +48,9 @@ class Watcher:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         listen = self._node.create_subscription
-        listen(DiagnosticStatus, topics.FLIGHT_EVENTS, self._on_event, EVENTS)
+        for space in namespaces:
+            name = f'{space}/{topics.FLIGHT_EVENTS}'
+            listen(DiagnosticStatus, name, partial(self._on_event, space), EVENTS)
         listen(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENTS)
         listen(Odometry, topics.ODOM, self._on_odometry, NEWEST)
         if steer:
@@ -112,9 +117,9 @@ class Watcher:
         message.vector.y = SWAY[1] * math.cos(0.7 * now)
         self._command.publish(message)
 
-    def _on_event(self, message: DiagnosticStatus) -> None:
+    def _on_event(self, space: str, message: DiagnosticStatus) -> None:
         values = {pair.key: pair.value for pair in message.values}
-        self.events.append((message.name.rpartition(': ')[2], values))
+        self.events.append((space + message.name.rpartition(': ')[2], values))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

@@ -92,13 +92,16 @@ class Process:
     Ctrl-C in the terminal reaches only who started it, who then ends it in order.
     """
 
-    def __init__(self, program: str, parameters: Mapping[str, object], folder: Path) -> None:
+    def __init__(
+        self, program: str, parameters: Mapping[str, object], folder: Path, *arguments: str
+    ) -> None:
         """Start it.
 
         Args:
             program: Such as 'sim_node'.
             parameters: Of the node.
             folder: For the file of parameters and for what it says.
+            arguments: More for ROS, such as '-r' and '__ns:=/red'.
         """
         self.name = program
         self.log = folder / f'{program}.log'
@@ -108,7 +111,7 @@ class Process:
         command = [sys.executable, '-c', _PROGRAM.format(program)]
         with self.log.open('wb') as log:
             self._process = subprocess.Popen(  # noqa: S603 - this package's own programs
-                [*command, '--ros-args', '--params-file', str(file)],
+                [*command, '--ros-args', '--params-file', str(file), *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
@@ -155,9 +158,11 @@ class Process:
 
 
 @contextmanager
-def started(program: str, parameters: Mapping[str, object], folder: Path) -> Iterator[Process]:
+def started(
+    program: str, parameters: Mapping[str, object], folder: Path, *arguments: str
+) -> Iterator[Process]:
     """Yield a process that ends with the block, in order or, where that fails, at once."""
-    process = Process(program, parameters, folder)
+    process = Process(program, parameters, folder, *arguments)
     try:
         yield process
     except BaseException:

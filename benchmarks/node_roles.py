@@ -1,0 +1,109 @@
+"""The other processes of benchmarks/node.py: a listener, a commander and the naive node.
+
+usage: benchmarks/node_roles.py listen TOPIC ... | command RATE | naive RATE
+"""
+
+import sys
+import time
+
+from geometry_msgs.msg import PoseStamped, TransformStamped, Vector3Stamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+import rclpy
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64
+
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.equations import Control
+from disc_sim_ros.core.flight import Setup
+from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.core.simulator import FlightSimulator
+from disc_sim_ros.nodes import conversions, topics
+
+DEEP = QoSProfile(depth=1000)
+TYPES = {
+    'odom': Odometry, 'pose': PoseStamped, 'transform': TransformStamped, 'imu': Imu,
+    'joint_states': JointState, 'aero_wrench': WrenchStamped, 'airspeed': Float64,
+    'path': PathMessage,
+}  # fmt: skip
+HIGH = 1000.0  # m: a disc thrown from here flies for minutes
+
+
+def listen(*names: str) -> None:
+    """Say when messages of the first of these topics come, and how many a second."""
+    rclpy.init()
+    node = rclpy.create_node('listener')
+    subscriptions = [node.create_subscription(TYPES[name], name, print, DEEP) for name in names]
+    readers = [(s.handle, TYPES[name]) for s, name in zip(subscriptions, names, strict=True)]
+    counts = [0] * len(readers)
+    first = None
+    try:
+        while True:
+            for k, (reader, kind) in enumerate(readers):
+                while reader.take_message(kind, True) is not None:  # noqa: FBT003 - raw
+                    counts[k] += 1
+            if first is None and counts[0]:
+                print('hears', flush=True)
+                first, counts[0] = time.monotonic(), 0
+            time.sleep(1e-3)
+    except KeyboardInterrupt:
+        print(counts[0] / (time.monotonic() - (first or 0.0)))
+
+
+def command(rate: str) -> None:
+    """Send coefficients at a rate."""
+    rclpy.init()
+    node = rclpy.create_node('commander')
+    send = node.create_publisher(Vector3Stamped, topics.CMD_COEFFICIENTS, 10)
+    message = Vector3Stamped()
+    message.vector.x = 1e-6
+    epoch, i = time.monotonic(), 0
+    try:
+        while True:
+            send.publish(message)
+            i += 1
+            time.sleep(max(0.0, epoch + i / float(rate) - time.monotonic()))
+    except KeyboardInterrupt:
+        pass
+
+
+def naive(rate: str) -> None:
+    """Be the node that one writes first."""
+    rclpy.init()
+    node = rclpy.create_node('naive')
+    setup = Setup(disc=catalogue.load('frisbee'), step=1.0 / float(rate))
+    sim = FlightSimulator(setup, Launch(height=HIGH).state(), ground=False)
+    odom = node.create_publisher(Odometry, 'odom', DEEP)
+    pose = node.create_publisher(PoseStamped, 'pose', DEEP)
+
+    def on_command(message: Vector3Stamped) -> None:
+        sim.control = Control(message.vector.x, message.vector.y, message.vector.z)
+
+    def on_timer() -> None:
+        sim.advance(1)
+        stamp = node.get_clock().now().to_msg()
+        x, y, z, qx, qy, qz, qw, *twist = conversions.odometry(sim.state)
+        at = PoseStamped()
+        at.header.stamp, at.header.frame_id = stamp, 'map'
+        at.pose.position.x, at.pose.position.y, at.pose.position.z = x, y, z
+        q = at.pose.orientation
+        q.x, q.y, q.z, q.w = qx, qy, qz, qw
+        message = Odometry(child_frame_id='disc')
+        message.header = at.header
+        message.pose.pose = at.pose
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = twist
+        odom.publish(message)
+        pose.publish(at)
+
+    node.create_subscription(Vector3Stamped, topics.CMD_COEFFICIENTS, on_command, DEEP)
+    node.create_timer(1.0 / float(rate), on_timer)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
+        pass
+
+
+if __name__ == '__main__':
+    {'listen': listen, 'command': command, 'naive': naive}[sys.argv[1]](*sys.argv[2:])

@@ -1,0 +1,61 @@
+"""How long `fly` takes from its start to its answer, beside Python that only imports numba.
+
+Wall time of whole processes, the best of a few; cold is with an empty cache of machine code, as
+on a new machine.
+
+usage: benchmarks/startup.py
+"""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+import time
+
+from lines import Line, print_lines
+
+ROUNDS = 5
+FLY = [str(Path(sys.executable).with_name('fly')), '--json']
+IMPORTS = [sys.executable, '-c', 'import numpy, numba']
+
+
+def main() -> None:
+    """Print what was measured."""
+    print_lines(lines())
+
+
+def lines() -> tuple[Line, ...]:
+    """Measure both starts in turns."""
+    seconds(FLY)  # compiles, if need be
+    pairs = [(seconds(FLY), seconds(IMPORTS)) for _ in range(ROUNDS)]
+    warm, imports = (min(times) for times in zip(*pairs, strict=True))
+    with tempfile.TemporaryDirectory() as empty:
+        cold = seconds(FLY, XDG_CACHE_HOME=empty, NUMBA_CACHE_DIR='')
+    return (
+        Line(
+            what='`fly`, start to answer',
+            ours=f'{warm:.2f} s',
+            beside=f'Python that imports numpy and numba {imports:.2f} s',
+            ratio=warm / imports,
+        ),
+        Line(
+            what='the same, first time on a machine',
+            ours=f'{cold:.1f} s',
+            beside=f'later {warm:.2f} s',
+            ratio=cold / warm,
+        ),
+    )
+
+
+def seconds(command: list[str], **environment: str) -> float:
+    """Return the time that a process takes [s]."""
+    start = time.perf_counter()
+    subprocess.run(
+        command, env={**os.environ, **environment}, stdout=subprocess.DEVNULL, check=True
+    )
+    return time.perf_counter() - start
+
+
+if __name__ == '__main__':
+    main()

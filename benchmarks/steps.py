@@ -1,0 +1,268 @@
+"""The error over the step, in axes that do not spin and in axes fixed in the disc.
+
+Each launch flies for the time after which the independent integration of test/reference lands
+(tolerance 1e-12), and its end is compared with that landing. All three kinds of axes of
+benchmarks/spinning.py run through the same compiled loop, and cost CPU time in the same way. What
+is checked first: that loop in despun axes against `flight.fly`, and both spinning ones against
+scipy's DOP853 with a tolerance of 1e-12.
+
+usage: benchmarks/steps.py [--write]   (--write: docs/steps.csv and docs/steps.png)
+"""
+
+import argparse
+import csv
+from dataclasses import asdict, dataclass, replace
+from itertools import takewhile
+import math
+from pathlib import Path
+import sys
+import time
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+
+from lines import Line, number, print_lines
+import numpy as np
+from reference.cases import FRISBEE
+from reference.reference_flight import reference_flight
+from scipy.integrate import solve_ivp
+from spinning import DESPUN, PRINTED, SPINNING, flown, rates, released
+
+from disc_sim_ros.core import catalogue
+from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros.core.flight import Setup, fly
+from disc_sim_ros.core.launch import Launch
+
+DOCS = Path(__file__).parents[1] / 'docs'
+LAUNCHES = {
+    'Fig. 5, 31 rad/s': Launch(),
+    'slow spin, 10 rad/s': Launch(spin=10.0),
+    'wobbling, 31 rad/s': Launch(roll_rate=3.0, pitch_rate=-2.0),
+    'drive, 25 m/s, 90 rad/s': Launch(speed=25.0, pitch=8.0, spin=90.0, height=1.5),
+}
+AXES = {DESPUN: 'despun', SPINNING: 'spinning', PRINTED: 'spinning_uvw'}
+STEPS = tuple(
+    m * 10.0**e
+    for e in (-4, -3, -2)
+    for m in (1.0, 1.4, 2.0, 3.0, 5.0, 7.0)
+    if m * 10.0**e < 0.0501
+)  # s
+FINE = np.geomspace(5e-4, 5e-2, 241)  # s, where the longest step within ALLOWED is sought
+ALLOWED = 1e-3  # m
+ROUNDS = 3
+ROUND_S = 0.02  # CPU seconds a round
+OFF = 1.0  # m: a flight that is further off has nothing to do with the throw
+
+
+@dataclass(frozen=True)
+class Point:
+    """One flight in one kind of axes."""
+
+    launch: str
+    axes: str
+    step: float  # s
+    error: float  # m at the landing; infinite if it blew up or the step is refused
+    evaluations: int  # of the equations of motion
+    seconds: float  # CPU time
+
+
+@dataclass(frozen=True)
+class Throw:
+    """A launch and where it lands."""
+
+    name: str
+    launch: Launch
+    time: float  # s
+    landing: tuple[float, float, float]  # m, earth axes 1
+
+
+def main() -> None:
+    """Measure, print, and write table and picture if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser.add_argument('--write', action='store_true', help='write docs/steps.csv and .png')
+    print_lines(lines(write=parser.parse_args().write))
+
+
+def lines(*, write: bool = False) -> tuple[Line, ...]:
+    """Measure and print every flight; return what the despun axes are worth."""
+    setup = Setup(disc=catalogue.load('frisbee'))
+    throws = [landed(name, launch) for name, launch in LAUNCHES.items()]
+    for throw in throws:
+        check(throw, setup)
+    points = [point(throw, axes, step, setup) for throw in throws for step in STEPS
+              for axes in AXES]  # fmt: skip
+    print_table(points)
+    if write:
+        write_csv(DOCS / 'steps.csv', points)
+        (DOCS / 'steps.png').write_bytes(picture(points))
+    return tuple(worth(throw, setup) for throw in throws)
+
+
+def landed(name: str, launch: Launch) -> Throw:
+    """Return a launch with its landing by the independent integration."""
+    thrown = asdict(launch)
+    thrown['alpha'] = thrown.pop('angle_of_attack')
+    flight = reference_flight(FRISBEE, thrown)
+    x, y, z = map(float, flight['landing_position_m'])
+    return Throw(name, launch, flight['flight_time_s'], (x, -y, -z))
+
+
+def off(throw: Throw, axes: int, step: float, setup: Setup) -> float:
+    """Return how far from its landing a flight is at that time [m].
+
+    Infinite if it blew up, or if `fly` refuses the step.
+    """
+    if axes == DESPUN:
+        try:
+            replace(setup, step=step).check_step(throw.launch.spin, throw.launch.speed)
+        except ConfigError:
+            return math.inf
+    disc = setup.disc
+    state = released(throw.launch.state(), axes)
+    parts = (setup.plant, disc.table_rows, disc.spin_terms)
+    end = flown(state, axes, step, throw.time, *parts)
+    error = math.dist(end[:3], throw.landing)
+    return error if error < math.inf else math.inf  # no nan
+
+
+def check(throw: Throw, setup: Setup) -> None:
+    """Print by how much the ways to compute one flight differ.
+
+    Raises:
+        SystemExit: More than can be; what is measured here would mean nothing.
+    """
+    disc = setup.disc
+    parts = (setup.plant, disc.table_rows, disc.spin_terms)
+    state = throw.launch.state()
+    by_core = fly(throw.launch, setup, duration=throw.time, ground=False).end
+    same = math.dist(by_core[:3], flown(state, DESPUN, setup.step, throw.time, *parts)[:3])
+    found = {'despun loop from flight.fly': (same, 1e-12)}
+    for axes in (SPINNING, PRINTED):
+        solution = solve_ivp(
+            lambda _, y, axes=axes: rates(y, axes, *parts),
+            (0.0, throw.time),
+            released(state, axes),
+            method='DOP853',
+            rtol=1e-12,
+            atol=1e-12,
+        )
+        error = math.dist(solution.y[:3, -1], throw.landing)
+        found[f'DOP853 of {AXES[axes]} from the reference'] = (error, 1e-7)
+    found['despun at 0.02 ms from the reference'] = (off(throw, DESPUN, 2e-5, setup), 1e-7)
+    print(f'{throw.name}: ' + ', '.join(f'{name} {d:.0e} m' for name, (d, _) in found.items()))
+    if not all(difference <= most for difference, most in found.values()):
+        raise SystemExit('steps: the ways to compute this flight differ by more than they may')
+
+
+def point(throw: Throw, axes: int, step: float, setup: Setup) -> Point:
+    """Return error and cost of one flight."""
+    error = off(throw, axes, step, setup)
+    evaluations = 4 * math.ceil(throw.time / step)
+    return Point(throw.name, AXES[axes], step, error, evaluations, cpu(throw, axes, step, setup))
+
+
+def cpu(throw: Throw, axes: int, step: float, setup: Setup) -> float:
+    """Return the CPU seconds of one flight, in the best of a few rounds."""
+    disc, state = setup.disc, released(throw.launch.state(), axes)
+    arguments = (state, axes, step, throw.time, setup.plant, disc.table_rows, disc.spin_terms)
+    best, count = math.inf, 1
+    for _ in range(ROUNDS + 1):
+        start = time.process_time()
+        for _ in range(count):
+            flown(*arguments)
+        best = min(best, (time.process_time() - start) / count)
+        count = max(1, round(ROUND_S / max(best, 1e-6)))
+    return best
+
+
+def longest_step(throw: Throw, axes: int, setup: Setup) -> float:
+    """Return the longest step that is within ALLOWED, as are all shorter ones [s]."""
+    good = takewhile(lambda h: off(throw, axes, float(h), setup) <= ALLOWED, FINE)
+    return float(list(good)[-1])
+
+
+def worth(throw: Throw, setup: Setup) -> Line:
+    """Return what the despun axes save at the same error."""
+    step = {axes: longest_step(throw, axes, setup) for axes in AXES}
+    rounds = [{axes: cpu(throw, axes, step[axes], setup) for axes in AXES} for _ in range(3)]
+    cost = {axes: min(costs[axes] for costs in rounds) for axes in AXES}
+    told = {axes: f'{number(step[axes] * 1e3, 3)} ms steps, {number(cost[axes] * 1e6)} us'
+            for axes in AXES}  # fmt: skip
+    return Line(
+        what=f'{throw.name}, {ALLOWED * 1e3:g} mm off',
+        ours=f'{told[DESPUN]} a flight',
+        beside=f'attitude and rates in axes fixed in the disc {told[SPINNING]}; '
+        f'velocity too {told[PRINTED]}',
+        ratio=cost[SPINNING] / cost[DESPUN],
+        short=throw.launch.spin > 50.0,
+    )
+
+
+def print_table(points: list[Point]) -> None:
+    """Print all flights, a line for each launch and step."""
+    names = list(AXES.values())
+    by = {(p.launch, p.step, p.axes): p for p in points}
+    for launch in LAUNCHES:
+        print(f'\n{launch}: error [mm] and CPU time [us] of a flight in axes')
+        print(f' step, ms  evaluations {"".join(f"{name:>24}" for name in names)}')
+        for step in STEPS:
+            row = [by[launch, step, name] for name in names]
+            cells = ''.join(
+                f'{p.error * 1e3:13.3g} {p.seconds * 1e6:10.0f}'
+                if p.error < OFF
+                else f'{"lost":>13} {p.seconds * 1e6:10.0f}'
+                for p in row
+            )
+            print(f'{step * 1e3:9.2g} {row[0].evaluations:12d} {cells}')
+    print()
+
+
+def write_csv(path: Path, points: list[Point]) -> None:
+    """Write all flights."""
+    with path.open('w', encoding='utf-8', newline='') as file:
+        writer = csv.writer(file, lineterminator='\n')
+        writer.writerow(['launch', 'axes', 'step_s', 'error_m', 'evaluations', 'cpu_s'])
+        for p in points:
+            writer.writerow([p.launch, p.axes, f'{p.step:g}', f'{p.error:.4g}', p.evaluations,
+                             f'{p.seconds:.3g}'])  # fmt: skip
+
+
+def picture(points: list[Point]) -> bytes:
+    """Return the PNG: a panel for each launch, a curve for each kind of axes."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - a second, for the picture alone
+
+    from disc_sim_ros.experiments.drawing import LIGHT, image, style  # noqa: PLC0415
+
+    looks = {
+        'despun': (LIGHT.printed, 'o', 'axes that do not spin (this package)'),
+        'spinning': (LIGHT.tenth, 's', 'attitude and rates in axes fixed in the disc'),
+        'spinning_uvw': (LIGHT.third, '^', 'and the velocity too, as eqns 10 and 11 are printed'),
+    }
+    with style(LIGHT):
+        figure = Figure(figsize=(10.5, 7.4), dpi=130, layout='constrained')
+        panels = figure.subplots(2, 2, sharex=True, sharey=True)
+        for panel, launch in zip(panels.flat, LAUNCHES, strict=True):
+            for name, (colour, mark, label) in looks.items():
+                row = [p for p in points if (p.launch, p.axes) == (launch, name)]
+                panel.loglog(
+                    [p.step * 1e3 for p in row],
+                    [p.error * 1e3 if p.error < OFF else math.nan for p in row],
+                    color=colour, marker=mark, markersize=4.5, label=label,
+                )  # fmt: skip
+            panel.axhline(ALLOWED * 1e3, color=LIGHT.ink, linewidth=0.9, linestyle='--')
+            panel.set_title(launch)
+        panels[0, 0].text(0.1, ALLOWED * 1.2e3, ' 1 mm', va='bottom')
+        panels[0, 0].set_ylim(1e-7, OFF * 1e3)
+        for panel in panels[1]:
+            panel.set_xlabel('step [ms]')
+            panel.xaxis.set_major_formatter('{x:g}')
+        for panel in panels[:, 0]:
+            panel.set_ylabel('error at the landing [mm]')
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc='outside lower center', ncols=3)
+        figure.suptitle('Same equations, same RK4: what the axes are worth', x=0.012, ha='left',
+                        fontsize=13, fontweight='bold')  # fmt: skip
+        return image(figure, 'png', LIGHT)
+
+
+if __name__ == '__main__':
+    main()
