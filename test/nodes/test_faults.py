@@ -172,10 +172,11 @@ def wall_clock(tmp_path, monkeypatch):
 
 
 def test_the_wall_clock_may_be_set_while_it_flies_and_is_recorded(
-    ros, start, wall_clock, tmp_path, capsys
+    start, wall_clock, tmp_path, capsys, request
 ):
     flight = start()
-    recorder = Recorder(ros, tmp_path / 'bag', {})
+    recorder = Recorder(flight.ros, tmp_path / 'bag', {})
+    request.addfinalizer(recorder.process.kill)
     recorder.listens_to('/odom', '/flight_events', '/configuration', '/release')
     first = len(flight.odom)
     flight.throw()
