@@ -180,7 +180,7 @@ def _record(
             sim = stack.enter_context(live.started('sim_node', parameters, folder))
             to = {'bag': str(bag.absolute()), 'start_paused': True}
             recorder = stack.enter_context(live.started('recorder_node', to, folder))
-        watcher = live.Watcher(domain, (sim, recorder))
+        watcher = live.Watcher(domain, (sim, recorder), signals.held)
         stack.callback(watcher.close)
         watcher.wait_until_recorded(bag)
         if any((control.C_L, control.C_M, control.C_N)):

@@ -1,7 +1,7 @@
 """One throw in real time, with sim_node and recorder_node as processes of their own."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 import fcntl
 import math
@@ -176,9 +176,22 @@ def started(
 class Watcher:
     """A node that waits for the simulator and its recorder, throws, and watches the disc."""
 
-    def __init__(self, domain: int, processes: tuple[Process, ...]) -> None:
-        """Join the domain; the processes are watched while this waits."""
+    def __init__(
+        self,
+        domain: int,
+        processes: tuple[Process, ...],
+        held: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
+        """Join the domain.
+
+        Args:
+            domain: Of ROS.
+            processes: Watched while this waits.
+            held: Makes a block in which no signal raises an exception: within rclpy it would end
+                as an error of another kind.
+        """
         self._processes = processes
+        self._held = held
         self._context = Context()
         rclpy.init(
             context=self._context,
@@ -300,9 +313,10 @@ class Watcher:
     def _spin(self, seconds: float) -> None:
         """Take what has come, and let others work for the rest of the time."""
         end = time.monotonic() + seconds
-        self._executor.spin_once(seconds)
-        for _ in range(10):
-            self._executor.spin_once(0.0)
+        with self._held():
+            self._executor.spin_once(seconds)
+            for _ in range(10):
+                self._executor.spin_once(0.0)
         time.sleep(max(end - time.monotonic(), 0.0))
 
     def _on_event(self, message: DiagnosticStatus) -> None:

@@ -68,6 +68,8 @@ code 2.
 - **Stamped** with the time of arrival as log time (of `/clock` with `use_sim_time`; what comes
   before the first `/clock` waits for it and gets that time, or that of arrival if none comes) and
   the time of sending as publish time.
+- **Undisturbed** where the wall clock is set: log times go on without the jump, of which it warns.
+  What has stamps of its own keeps them.
 - **Counted**: messages that the middleware lost, numbers missing in the sequence of a publisher
   that is alone on its topic, and messages dropped because 512 MiB waited for the disk stand in
   `/diagnostics`, in the log and in `custom_data` of the bag, as `lost`, `gaps` and `dropped` with
