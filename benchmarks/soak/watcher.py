@@ -1,49 +1,82 @@
 """A node that hears what becomes of every throw, and how time passes."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 import math
 import time
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from stamps import Stamps
 from std_srvs.srv import Trigger
 
 from disc_sim_ros.nodes import topics
 
+Values = dict[str, str]  # of an event or of diagnostics
+
 EVENTS = QoSProfile(depth=100_000)
-NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-COMMAND_RATE = 50.0  # Hz
 PATIENCE = 20.0  # s
 TO_BE_FOUND = 1.0  # s, for a service to know its client
-SWAY = (0.004, 0.003)  # C_L, C_M at most
+
+
+@dataclass(frozen=True, slots=True)
+class Second:
+    """What sim_node told of a second, and what odom showed of it.
+
+    Attributes:
+        time: By the monotonic clock [s].
+        offset: By how much simulated time was behind that clock at the least [s].
+        slipped: Told in all [s].
+        slips: Told in all.
+        worst: Greatest lateness in it, as told [s].
+        missed: Deadlines, told in all.
+        throws: Told in all.
+        landings: Told in all.
+    """
+
+    time: float
+    offset: float
+    slipped: float
+    slips: int
+    worst: float
+    missed: int
+    throws: int
+    landings: int
 
 
 class Watcher:
-    """Hears events, diagnostics and odom; steers where asked to.
+    """Hears events, diagnostics and odom.
 
     Attributes:
         events: (name, values) of each event, in order; a name has the namespace in front.
         told: The newest values of the diagnostics of each node.
-        offsets: (monotonic time, that minus the stamp of odom) [s], of what came.
+        seconds: One for each diagnostics of a simulator whose odom was heard meanwhile.
+        stamps: Of odom, where a rate was given.
     """
 
     def __init__(
-        self, domain: int, *, steer: bool = False, namespaces: Sequence[str] = ('',)
+        self, domain: int, *, rate: float = 0.0, namespaces: Sequence[str] = ('',)
     ) -> None:
-        """Join the domain."""
-        self.events: list[tuple[str, dict[str, str]]] = []
-        self.told: dict[str, dict[str, str]] = {}
-        self.offsets: list[tuple[float, float]] = []
-        self._domain = domain
-        self._context = context(domain)
+        """Join the domain; `rate` is that of odom."""
+        self.events: list[tuple[str, Values]] = []
+        self.told: dict[str, Values] = {}
+        self.seconds: list[Second] = []
+        self.stamps = Stamps(rate or 1.0)
+        self._offset = math.inf
+        self._context = Context()
+        rclpy.init(
+            context=self._context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
         self._node = Node('soak', context=self._context, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -52,12 +85,8 @@ class Watcher:
             name = f'{space}/{topics.FLIGHT_EVENTS}'
             listen(DiagnosticStatus, name, partial(self._on_event, space), EVENTS)
         listen(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENTS)
-        listen(Odometry, topics.ODOM, self._on_odometry, NEWEST)
-        if steer:
-            self._command = self._node.create_publisher(
-                Vector3Stamped, topics.CMD_COEFFICIENTS, topics.COMMAND_QOS
-            )
-            self._node.create_timer(1.0 / COMMAND_RATE, self._steer)
+        if rate:
+            listen(Odometry, topics.ODOM, self._on_odometry, EVENTS, raw=True)
 
     def close(self) -> None:
         """Leave the domain."""
@@ -95,27 +124,9 @@ class Watcher:
         answer = client.call_async(Trigger.Request())
         self.spin_until(answer.done, PATIENCE, f'an answer of {service}')
 
-    def greet(self) -> None:
-        """Let another participant come, listen, and go."""
-        other = context(self._domain)
-        node = Node('guest', context=other)
-        node.create_subscription(Odometry, topics.ODOM, lambda _: None, topics.STATE_QOS)
-        executor = SingleThreadedExecutor(context=other)
-        executor.add_node(node)
-        executor.spin_once(0.2)
-        executor.shutdown()
-        node.destroy_node()
-        other.try_shutdown()
-
-    def named(self, name: str) -> list[dict[str, str]]:
+    def named(self, name: str) -> list[Values]:
         """Return the values of the events of a name."""
         return [values for event, values in self.events if event == name]
-
-    def _steer(self) -> None:
-        message, now = Vector3Stamped(), time.monotonic()
-        message.vector.x = SWAY[0] * math.sin(now)
-        message.vector.y = SWAY[1] * math.cos(0.7 * now)
-        self._command.publish(message)
 
     def _on_event(self, space: str, message: DiagnosticStatus) -> None:
         values = {pair.key: pair.value for pair in message.values}
@@ -125,14 +136,24 @@ class Watcher:
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
             self.told[status.name.partition(':')[0]] = values
+            if status.name.endswith(': simulation') and math.isfinite(self._offset):
+                self._on_second(values)
 
-    def _on_odometry(self, message: Odometry) -> None:
-        now, stamp = time.monotonic(), message.header.stamp
-        self.offsets.append((now, now - stamp.sec - stamp.nanosec * 1e-9))
+    def _on_second(self, values: Values) -> None:
+        self.seconds.append(
+            Second(
+                time=time.monotonic(),
+                offset=self._offset,
+                slipped=float(values['slipped_s']),
+                slips=int(values['slips']),
+                worst=float(values['worst_lateness_s']),
+                missed=int(values['missed_deadlines']),
+                throws=int(values['throws']),
+                landings=int(values['landings']),
+            )
+        )
+        self._offset = math.inf
 
-
-def context(domain: int) -> Context:
-    """Return a participant of its own."""
-    made = Context()
-    rclpy.init(context=made, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-    return made
+    def _on_odometry(self, data: bytes, info: dict[str, Any]) -> None:
+        self.stamps.take(data, info)
+        self._offset = min(self._offset, time.monotonic() - self.stamps.newest * 1e-9)

@@ -126,22 +126,39 @@ def fly_again(flight: Flight) -> Reflight:
     stamps = flight.motion.stamps
     steps = np.rint((stamps - flight.start) * rate / NANOSECONDS).astype(np.int64)
     off = np.abs(steps * NANOSECONDS / rate - (stamps - flight.start)) > _ROUNDED
-    changes = tuple(c for c in flight.disc.changes if flight.start <= c.stamp < int(stamps[-1]))
+    end = _landing_step(flight, rate, float(told['publish_rate']), int(steps[-1]))
+    last = max(int(stamps[-1]), flight.start + math.floor(end * NANOSECONDS / rate))
+    changes = tuple(c for c in flight.disc.changes if flight.start <= c.stamp < last)
     waiting = [(round((c.stamp - flight.start) * rate / NANOSECONDS), c) for c in changes]
     states, winds = np.full((len(steps), 14), np.nan), np.full((len(steps), 3), np.nan)
     lost = ''
     try:
-        for row, step in enumerate(steps.tolist()):
+        for row, step in enumerate([*steps.tolist(), end]):
             # A message tells of a step before what changes there.
             while waiting and waiting[0][0] < step:
                 at, change = waiting.pop(0)
                 _advance(sim, at)
                 _apply(sim, change)
             _advance(sim, step)
-            states[row], winds[row] = sim.state, sim.wind
+            if row < len(steps):
+                states[row], winds[row] = sim.state, sim.wind
     except IntegrationError as error:
         lost = str(error)
     return Reflight(setup, release, states, winds, _landing(sim), changes, int(off.sum()), lost)
+
+
+def _landing_step(flight: Flight, rate: float, publish_rate: float, last: int) -> int:
+    """Return the step of a landing that the message after the last would show, or the last one.
+
+    The event comes when the disc lands, that message only when it is due: a bag may end between.
+    """
+    if flight.landing is None:
+        return last
+    try:
+        landed = float(flight.landing.values['flight_time_s']) * rate
+    except (KeyError, ValueError):
+        return last
+    return math.ceil(landed) if last < landed < last + rate / publish_rate else last
 
 
 def compare(flight: Flight, again: Reflight, bag_doubts: tuple[str, ...] = ()) -> Verdict:

@@ -14,6 +14,7 @@ from matplotlib import image
 import numpy as np
 import pytest
 
+from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.cli import analyse_bag, fly
 
 EXECUTABLE = Path(sys.executable).with_name('analyse_bag')
@@ -95,6 +96,26 @@ def test_a_steered_flight_in_gusts_is_flown_again_to_the_bit(document, steered):
     assert launch['speed_m_s'] == pytest.approx(14.0)
     assert launch['pitch_deg'] == pytest.approx(2.0)
     assert first['setup']['wind']['turbulence'] == 12.0
+
+
+def test_a_bag_that_ends_between_the_landing_and_the_message_that_shows_it(
+    document, tmp_path, capsys
+):
+    """A recorder that is ended at the event may be quicker than the simulator."""
+    pytest.importorskip('rclpy')
+    from analysis.bags import copy
+
+    assert fly.main(['--control', '0', '0.004', '0', '--bag', str(tmp_path / 'bag')]) == 0
+    capsys.readouterr()
+    whole = [m.data for m in open_bag(tmp_path / 'bag').raw(['/odom'])]
+    copy(tmp_path / 'bag', tmp_path / 'part', lambda message: message.data != whole[-1])
+    code, found = document(tmp_path / 'part', '--verify')
+    assert code == 0
+    (flight,) = found['discs'][0]['flights']
+    assert flight['messages']['count'] == len(whole) - 1
+    again = flight['verification']['re_flight']
+    assert again['identical_messages'] == len(whole) - 1
+    assert again['largest_difference']['landed.flight_time_s'] == 0.0
 
 
 def test_what_it_says_is_what_fly_says(document, capsys, tmp_path):
