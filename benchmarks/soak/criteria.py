@@ -63,24 +63,27 @@ def landings(landed: Sequence[Values], failed: Sequence[Values], thrown: int) ->
     )
 
 
-def evenness(stamps: Stamps) -> Check:
+def evenness(stamps: Stamps, throws: int) -> Check:
     """Stamps are whole periods from the first, so that estimators need not ask for gaps."""
     told = (
-        f'{stamps.count} messages over {stamps.span:.0f} s: {stamps.uneven} off the grid, '
+        f'{stamps.count} messages over {stamps.span:.0f} s, {stamps.lost} not heard: '
+        f'{stamps.uneven} off the grid, '
         f'{stamps.gaps} gaps, {stamps.infinite} not finite'
     )
     kept = stamps.count > 0 and not (stamps.uneven or stamps.gaps or stamps.infinite)
+    kept = kept and stamps.again <= throws
     return Check('stamps of odom', told, 'none', kept)
 
 
 def truth(seconds: Sequence[Second]) -> Check:
     """Time falls behind the steady clock by what the diagnostics tell as slipped, and no more."""
-    found = [
-        min(second.offset for second in quiet) - quiet[0].slipped
-        for _, group in itertools.groupby(seconds, lambda second: second.slipped)
-        for quiet in itertools.batched(group, QUIET)
-        if len(quiet) == QUIET
-    ]
+    found = []
+    for slipped, group in itertools.groupby(seconds, lambda second: second.slipped):
+        quiet = list(group)[1:]  # in the first, what was heard may be from before the slip
+        found += [
+            min(second.offset for second in quiet[i : i + QUIET]) - slipped
+            for i in range(0, len(quiet) - QUIET + 1, QUIET)
+        ]
     if not found:
         return Check('drift that is not told', f'never {QUIET} s without a slip', '', kept=False)
     least, most = min(found), max(found)

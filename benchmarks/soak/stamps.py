@@ -20,6 +20,7 @@ class Stamps:
         count: Messages taken.
         uneven: Stamps that are not a whole number of periods from the first.
         gaps: Stamps further apart than the messages between them, or going back.
+        again: Messages with the stamp of the one before.
         lost: Messages that the network lost.
         infinite: Messages with a number that is not finite.
         newest: The last stamp [ns].
@@ -27,7 +28,8 @@ class Stamps:
 
     def __init__(self, rate: float) -> None:
         """Expect so many messages a simulated second."""
-        self.count = self.uneven = self.gaps = self.lost = self.infinite = self.newest = 0
+        self.count = self.uneven = self.gaps = self.again = self.lost = self.infinite = 0
+        self.newest = 0
         self._period = round(NANOSECONDS / rate)
         self._first = self._sequence = 0
 
@@ -44,9 +46,9 @@ class Stamps:
             self._first, self.newest, self._sequence = stamp, stamp, sequence - 1
         messages = sequence - self._sequence
         periods, off = divmod(stamp - self.newest, self._period)
-        # Of the messages lost between, one may have been shown again.
-        least = messages - 1 if self.count else 0
-        self.gaps += not least <= periods <= messages
+        if self.count:
+            self.gaps += not messages - 1 <= periods <= messages
+            self.again += periods == messages - 1
         self.uneven += off != 0
         self.lost += messages - 1
         numbers = np.frombuffer(data, '<f8', NUMBERS, len(data) - 8 * NUMBERS)

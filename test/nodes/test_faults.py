@@ -4,6 +4,7 @@ Each flight is compared with the core's to the last bit, its stamps have to be e
 diagnostics tell has to be true. How quick the machine is, no test here asks.
 """
 
+from decimal import Decimal
 from itertools import pairwise
 import math
 import mmap
@@ -17,6 +18,8 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
+import numpy as np
+from numpy.testing import assert_array_equal
 import pytest
 
 pytest.importorskip('rclpy')
@@ -30,20 +33,39 @@ from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.core import catalogue
 from disc_sim_ros.core.flight import Setup, fly
 from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes import topics
+from disc_sim_ros.core.simulator import FlightSimulator
+from disc_sim_ros.nodes import conversions, topics
 
 pytestmark = pytest.mark.ros
 
 HIGH = {'launch.height': 5.0, 'auto_throw': False, 'publish_rate': 200.0}  # a flight of 4.8 s
 PERIOD = 5_000_000  # ns
 HOUR = 3600
-EXPECTED = fly(Launch(height=5.0), Setup(disc=catalogue.load('frisbee')))
+SETUP = Setup(disc=catalogue.load('frisbee'))
+LAUNCH = Launch(height=5.0)
+EXPECTED = fly(LAUNCH, SETUP)
+NUMBERS = 7 + 36 + 6 + 36  # what a serialised Odometry ends with, covariances after each part
+STATE = [*range(7), *range(43, 49)]  # pose and twist among them
 
 
 def ns(message: bytes) -> int:
     """The stamp of a serialised message that begins with a header."""
     seconds, nanoseconds = struct.unpack_from('<iI', message, 4)
     return seconds * 1_000_000_000 + nanoseconds
+
+
+def values_of(event):
+    return {pair.key: pair.value for pair in event.values}
+
+
+def computed(period):
+    """Pose and twist while in the air, a period [ns] apart, as the core has them."""
+    disc = FlightSimulator(SETUP, LAUNCH.state())
+    found = []
+    for _ in range(math.ceil(EXPECTED.time * 1e9 / period)):
+        found.append(conversions.odometry(disc.state))
+        disc.advance(period // 1_000_000)
+    return np.array(found)
 
 
 class Flight:
@@ -77,26 +99,43 @@ class Flight:
 
     def tells(self):
         """Wait for the next diagnostics, and return them."""
-        before = len(self.diagnostics)
-        self.ros.spin_until(lambda: len(self.diagnostics) > before, 'diagnostics')
-        status = self.diagnostics[-1].status[0]
-        return status, {pair.key: pair.value for pair in status.values}
+        self.diagnostics.clear()
+        found = []
 
-    def lands_as_computed(self, period=PERIOD):
-        """Wait for the landing; it is that of the core, and no stamp is missing or uneven."""
-        landed = []
+        def heard():  # a recorder tells of itself, too
+            found[:] = [m.status[0] for m in self.diagnostics if m.status[0].hardware_id == 'disc']
+            return found
+
+        self.ros.spin_until(heard, 'diagnostics')
+        return found[-1], values_of(found[-1])
+
+    def event(self, name):
+        """Wait for an event; return the values of the last of them."""
+        found = []
 
         def heard():
-            landed[:] = [e for e in self.events if e.name.endswith(': landed')]
-            return landed
+            found[:] = [e for e in self.events if e.name.endswith(f': {name}')]
+            return found
 
-        self.ros.spin_until(heard, 'the landing', 60.0)
-        values = {pair.key: float(pair.value) for pair in landed[-1].values}
+        self.ros.spin_until(heard, name, 60.0)
+        return values_of(found[-1])
+
+    def lands_as_computed(self, period=PERIOD):
+        """Wait for the landing: all odom and it are the core's, no stamp is missing or uneven."""
+        landed, thrown = self.event('landed'), self.event('thrown')
         x, y, _ = EXPECTED.position
-        assert values['flight_time_s'] == EXPECTED.time
-        assert (values['landing_x_m'], values['landing_y_m']) == (x, y)
+        assert float(landed['flight_time_s']) == EXPECTED.time
+        assert (float(landed['landing_x_m']), float(landed['landing_y_m'])) == (x, y)
         stamps = [ns(message) for message in self.odom]
         assert {b - a for a, b in pairwise(stamps)} <= {period, 0}  # 0: shown again at a throw
+        released = int(Decimal(thrown['stamp_s']) * 10**9)
+        told = {
+            stamp: np.frombuffer(message, '<f8', NUMBERS, len(message) - 8 * NUMBERS)
+            for stamp, message in zip(stamps, self.odom, strict=True)
+        }
+        expected = computed(period)
+        at = [released + k * period for k in range(len(expected))]
+        assert_array_equal([told[stamp][STATE] for stamp in at], expected)
 
 
 @pytest.fixture
@@ -119,9 +158,39 @@ def open_files(pid: int) -> int:
     return sum(1 for _ in Path(f'/proc/{pid}/fd').iterdir())
 
 
-def test_a_stopped_process_flies_on_exactly_and_tells_how_long_it_stood(start):
+@pytest.fixture
+def record(tmp_path, request):
+    """A function that records a flight from before the throw on, and throws."""
+
+    def recording(flight):
+        recorder = Recorder(flight.ros, tmp_path / 'bag', {})
+        request.addfinalizer(recorder.process.kill)
+        recorder.listens_to('/odom', '/flight_events', '/configuration', '/release')
+        begun = len(flight.odom)
+        flight.throw()
+
+        def has_it_all():
+            """End the recorder: all odom is in the bag, and the flight can be flown from it."""
+            last, bag = flight.odom[-1], []
+
+            def there():
+                bag[:] = [message.data for message in open_bag(recorder.bag).raw(['/odom'])]
+                return last in bag
+
+            flight.ros.spin_until(there, 'the last odom in the bag')
+            assert recorder.end() == 0
+            assert open_bag(recorder.bag).complete
+            assert set(bag) >= set(flight.odom[begun : flight.odom.index(last)])
+            assert analyse_bag.main([str(recorder.bag), '--verify']) == 0
+
+        return recorder, has_it_all
+
+    return recording
+
+
+def test_stopped_processes_go_on_exactly_and_tell_how_long_they_stood(start, record, capsys):
     flight = start()
-    flight.throw()
+    recorder, has_it_all = record(flight)
     before, slipped = flight.offset(), float(flight.tells()[1]['slipped_s'])
     process = flight.sim.process
     for stopped in (0.05, 0.5):
@@ -138,7 +207,12 @@ def test_a_stopped_process_flies_on_exactly_and_tells_how_long_it_stood(start):
     # What the messages show is what the diagnostics tell; a message takes less than 50 ms.
     assert float(values['slipped_s']) - slipped == pytest.approx(behind, abs=0.05)
     assert 'does not make up for it' in flight.sim.stderr
+    recorder.process.send_signal(signal.SIGSTOP)
+    time.sleep(0.5)
+    recorder.process.send_signal(signal.SIGCONT)
     flight.lands_as_computed()
+    has_it_all()
+    assert 'identical to the last bit' in capsys.readouterr().out
 
 
 @pytest.fixture
@@ -172,14 +246,10 @@ def wall_clock(tmp_path, monkeypatch):
 
 
 def test_the_wall_clock_may_be_set_while_it_flies_and_is_recorded(
-    start, wall_clock, tmp_path, capsys, request
+    start, wall_clock, record, capsys
 ):
     flight = start()
-    recorder = Recorder(flight.ros, tmp_path / 'bag', {})
-    request.addfinalizer(recorder.process.kill)
-    recorder.listens_to('/odom', '/flight_events', '/configuration', '/release')
-    first = len(flight.odom)
-    flight.throw()
+    recorder, has_it_all = record(flight)
     for seconds in (HOUR, -HOUR, 0):
         flight.goes_on(0.4)
         wall_clock(seconds)
@@ -187,12 +257,7 @@ def test_the_wall_clock_may_be_set_while_it_flies_and_is_recorded(
         flight.tells()
     flight.lands_as_computed()
     recorder.wait_for('the wall clock was set by +3600.0 s; log times go on')
-    assert recorder.end() == 0
-    bag = open_bag(recorder.bag)
-    assert bag.complete
-    recorded = {m.data for m in bag.raw(['/odom'])}
-    assert recorded >= set(flight.odom[first:])
-    assert analyse_bag.main([str(recorder.bag), '--verify']) == 0
+    has_it_all()
     assert 'identical to the last bit' in capsys.readouterr().out
 
 
@@ -236,20 +301,28 @@ def test_peers_that_come_and_go_and_parameters_set_all_the_time_change_nothing(r
     pid = flight.sim.process.pid
 
     def visit():
-        context = Context()
-        context.init(args=[])
-        guest = Node('guest', context=context, start_parameter_services=False)
-        guest.create_subscription(Odometry, topics.ODOM, print, topics.STATE_QOS)
-        publisher = guest.create_publisher(Odometry, topics.THROW, topics.COMMAND_QOS)
-        ros.spin_until(publisher.get_subscription_count, 'the simulator')
-        guest.destroy_node()
-        context.try_shutdown()
+        """Four participants at a time: each listens and may throw."""
+        contexts = [Context() for _ in range(4)]
+        for context in contexts:
+            context.init(args=[])
+        guests = [Node('guest', context=c, start_parameter_services=False) for c in contexts]
+        publishers = []
+        for guest in guests:
+            guest.create_subscription(Odometry, topics.ODOM, print, topics.STATE_QOS)
+            publishers.append(guest.create_publisher(Odometry, topics.THROW, topics.COMMAND_QOS))
+        ros.spin_until(
+            lambda: all(p.get_subscription_count() for p in publishers), 'the simulator'
+        )
+        for guest, context in zip(guests, contexts, strict=True):
+            guest.destroy_node()
+            context.try_shutdown()
 
     visit()
     before = open_files(pid)
     flight.throw()
-    for n in range(12):
-        visit()
+    for n in range(15):
+        if n % 3 == 0:
+            visit()
         assert ros.set(flight.sim, {'launch.speed': 10.0 + n, 'path_rate': 5.0 + n}).successful
         refused = ros.set(flight.sim, {'launch.speed': 20.0, 'publish_rate': 300.0})
         assert not refused.successful
@@ -258,5 +331,4 @@ def test_peers_that_come_and_go_and_parameters_set_all_the_time_change_nothing(r
     ros.spin_until(lambda: open_files(pid) <= before, 'sockets of those who left to be closed')
     assert ros.call(flight.sim, 'throw').success
     ros.spin_until(lambda: flight.events[-1].name.endswith(': thrown'), 'the next throw')
-    thrown = {pair.key: pair.value for pair in flight.events[-1].values}
-    assert float(thrown['speed_m_s']) == pytest.approx(21.0)
+    assert float(flight.event('thrown')['speed_m_s']) == pytest.approx(24.0)
