@@ -97,6 +97,16 @@ class Flight:
             least = min(least, time.monotonic() - ns(self.odom[-1]) * 1e-9)
         return least
 
+    def behind(self):
+        """Return `offset`, and what is told as slipped, of a time without a slip [s]."""
+        told = float(self.tells()[1]['slipped_s'])
+        for _ in range(30):  # a busy machine may hold it up at any time
+            offset, before = self.offset(), told
+            told = float(self.tells()[1]['slipped_s'])
+            if told == before:
+                return offset, told
+        pytest.fail('never a second without a slip')
+
     def tells(self):
         """Wait for the next diagnostics, and return them."""
         self.diagnostics.clear()
@@ -126,15 +136,17 @@ class Flight:
         x, y, _ = EXPECTED.position
         assert float(landed['flight_time_s']) == EXPECTED.time
         assert (float(landed['landing_x_m']), float(landed['landing_y_m'])) == (x, y)
+        expected = computed(period)
+        released = int(Decimal(thrown['stamp_s']) * 10**9)
+        at = [released + k * period for k in range(len(expected))]
+        # Topics overtake each other: the event may be here before the last odom.
+        self.ros.spin_until(lambda: ns(self.odom[-1]) >= at[-1], 'the last odom')
         stamps = [ns(message) for message in self.odom]
         assert {b - a for a, b in pairwise(stamps)} <= {period, 0}  # 0: shown again at a throw
-        released = int(Decimal(thrown['stamp_s']) * 10**9)
         told = {
             stamp: np.frombuffer(message, '<f8', NUMBERS, len(message) - 8 * NUMBERS)
             for stamp, message in zip(stamps, self.odom, strict=True)
         }
-        expected = computed(period)
-        at = [released + k * period for k in range(len(expected))]
         assert_array_equal([told[stamp][STATE] for stamp in at], expected)
 
 
@@ -191,7 +203,7 @@ def record(tmp_path, request):
 def test_stopped_processes_go_on_exactly_and_tell_how_long_they_stood(start, record, capsys):
     flight = start()
     recorder, has_it_all = record(flight)
-    before, slipped = flight.offset(), float(flight.tells()[1]['slipped_s'])
+    before, slipped = flight.behind()
     process = flight.sim.process
     for stopped in (0.05, 0.5):
         process.send_signal(signal.SIGSTOP)
@@ -202,10 +214,10 @@ def test_stopped_processes_go_on_exactly_and_tell_how_long_they_stood(start, rec
             status, values = flight.tells()
         assert status.level == DiagnosticStatus.WARN
         assert 'ms late' in status.message
-    behind, (_, values) = flight.offset() - before, flight.tells()
-    assert behind > 0.3  # of 0.5 s, all but 0.1 s are given up
-    # What the messages show is what the diagnostics tell; a message takes less than 50 ms.
-    assert float(values['slipped_s']) - slipped == pytest.approx(behind, abs=0.05)
+    offset, told = flight.behind()
+    assert offset - before > 0.3  # of 0.5 s, all but 0.1 s are given up
+    # What the messages show is what the diagnostics tell; the quickest takes less than 50 ms.
+    assert told - slipped == pytest.approx(offset - before, abs=0.05)
     assert 'does not make up for it' in flight.sim.stderr
     recorder.process.send_signal(signal.SIGSTOP)
     time.sleep(0.5)
