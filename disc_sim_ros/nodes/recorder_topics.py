@@ -59,7 +59,7 @@ class Topics:
                 self._log.info(f'recording {", ".join(new)}')
             for track in self.tracks.values():
                 track.tidy()
-                if track.stale:
+                if track.stale or self._node.count_publishers(track.name) != track.known:
                     self._follow(track)
 
     def take(self) -> bool:
@@ -123,6 +123,7 @@ class Topics:
         if not topic.definition:
             self.warn_once(f'{name}: no definition of {type_name} here, so that few can read it')
         track.topic_id = self._number(topic)
+        track.known = len(publishers)
         self.tracks[name] = track
         return True
 
@@ -148,6 +149,7 @@ class Topics:
         """Tell the bag of the publishers of today, and hear them all."""
         track.stale = False
         publishers = self._node.get_publishers_info_by_topic(track.name)
+        track.known = len(publishers)  # the graph may learn later than the subscription
         publishers = [p for p in publishers if p.topic_type == track.type_name]
         if not publishers:
             return

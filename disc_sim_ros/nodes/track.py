@@ -44,6 +44,7 @@ class Track:
         type_name: Such as 'nav_msgs/msg/Odometry'.
         topic_id: In the bag.
         stale: A publisher came or went since the bag was told of them.
+        known: How many there were in the graph when it was told.
         publishers: How many are heard.
         received: Messages that came.
         dropped: Messages that came and were not recorded, because too many waited.
@@ -71,7 +72,7 @@ class Track:
         self.type_name = type_name
         self.topic_id = 0
         self.stale = False
-        self.publishers = 0
+        self.known = self.publishers = 0
         self.received = self.dropped = self.lost = self.missed = 0
         self.lateness = 0
         self._kind = message_type(type_name)
