@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from disc_sim_ros.cli.arguments import number
 from disc_sim_ros.nodes import live, topics
 
-PATIENCE = 10.0  # s, for the simulator to be found and to answer
+PATIENCE = 30.0  # s, for the simulator to be found and to answer
 ENDS = ('landed', 'failed', 'reset')
 
 

@@ -21,7 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
-PATIENCE = 10.0  # s, for the simulator to be found and to answer
+PATIENCE = 30.0  # s, for the simulator to be found and to answer
 RATE = 50.0  # Hz; a command that is not renewed for command_timeout, 0.5 s, falls to zero
 
 

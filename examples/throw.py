@@ -19,7 +19,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-PATIENCE = 10.0  # s, for the simulator to be found, and for it to throw
+PATIENCE = 30.0  # s, for the simulator to be found
+TO_THROW = 10.0  # s, for it to throw
 TO_BE_FOUND = 0.2  # s, for the simulator to find our subscription in turn, which we cannot see
 ENDS = {'landed', 'failed', 'reset', 'thrown'}  # events that end a flight
 
@@ -121,7 +122,7 @@ def main(arguments: list[str] | None = None) -> int:
             return 1
         node.spin_until(lambda: False, TO_BE_FOUND)
         node.throw(release(options))
-        if not node.spin_until(lambda: node.events, PATIENCE):
+        if not node.spin_until(lambda: node.events, TO_THROW):
             print('it did not throw: it is paused, or its log says why', file=sys.stderr)
             return 1
         node.spin_until(node.end_of_flight)

@@ -1,9 +1,12 @@
 """For all tests: ROS messages check their fields, and nodes are tested one after the other."""
 
 import os
+import signal
 
 import pytest
 
+# A shell has what it starts in the background ignore Ctrl-C, and so would what the tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first imported
 
 IN_REAL_TIME, MAKES_WAY = 0, 10  # niceness

@@ -25,6 +25,7 @@ from dataclasses import astuple, fields
 import json
 import os
 from pathlib import Path
+import shutil
 import signal
 import subprocess
 import sys
@@ -151,7 +152,7 @@ def real(stack: ExitStack, domain: int, folder: Path, minutes: float, out: Path)
         criteria.truth(watcher.seconds),
         *criteria.pace(watcher.seconds),
         criteria.losses(told),
-        verified(bag),
+        verified(bag, out),
         *(check for name, taken in samples.items() for check in criteria.resources(name, taken)),
     ]
 
@@ -232,8 +233,8 @@ def as_computed(landed: Sequence[Values], count: int) -> Check:
     )
 
 
-def verified(bag: Path) -> Check:
-    """Every flight in the bag is flown again from it, to the last bit."""
+def verified(bag: Path, out: Path) -> Check:
+    """Every flight in the bag is flown again from it, to the last bit; else the bag is kept."""
     module = ['-m', 'disc_sim_ros.cli.analyse_bag']
     done = subprocess.run(
         [sys.executable, *module, str(bag), '--verify', '--json'],
@@ -242,7 +243,7 @@ def verified(bag: Path) -> Check:
         check=False,
     )
     what, allowed = 'flights in the bag, flown again', 'all identical, none missing'
-    if done.returncode:
+    if done.returncode not in {0, 3}:  # 3: it found a difference
         return Check(what, f'analyse_bag: {done.stderr.strip()}', allowed, kept=False)
     (disc,) = json.loads(done.stdout)['discs']
     flown = [flight['verification']['re_flight'] for flight in disc['flights']]
@@ -253,7 +254,11 @@ def verified(bag: Path) -> Check:
         f'{same} of {len(flown)} identical to the last bit, {missing} messages missing; '
         f'{sum(files) / 2**20:.0f} MiB in {len(files)} files'
     )
-    return Check(what, told, allowed, same == len(flown) and not missing)
+    kept = same == len(flown) and not missing and not done.returncode
+    if not kept:
+        shutil.copytree(bag, out / bag.name)
+        (out / 'verified.json').write_text(done.stdout, encoding='utf-8')
+    return Check(what, told, allowed, kept)
 
 
 @contextmanager

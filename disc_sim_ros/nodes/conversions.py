@@ -33,7 +33,8 @@ TRANSFORM_FIELDS = _paths('transform.translation', _VECTOR) + _paths(
 SPIN_TRANSFORM_FIELDS = ('transform.rotation.z', 'transform.rotation.w')
 JOINT_FIELDS = ('position.0', 'velocity.0')
 IMU_FIELDS = _paths('angular_velocity', _VECTOR) + _paths('linear_acceleration', _VECTOR)
-WRENCH_FIELDS = _paths('wrench.force', _VECTOR) + _paths('wrench.torque', _VECTOR)
+TORQUE_FIELDS = _paths('wrench.torque', _VECTOR)
+WRENCH_FIELDS = _paths('wrench.force', _VECTOR) + TORQUE_FIELDS
 VECTOR_FIELDS = _paths('vector', _VECTOR)
 
 LARGEST_MOMENT = 1e3  # N m

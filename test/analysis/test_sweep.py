@@ -348,7 +348,7 @@ def progress(done, total):
         os.kill(os.getpid(), signal.SIGKILL)
 sweep(QUESTION, {str(path)!r}, batch=50, progress=progress)
 """
-    ended = subprocess.run([sys.executable, '-c', script], check=False, timeout=60)
+    ended = subprocess.run([sys.executable, '-c', script], check=False, timeout=120)
     assert ended.returncode == -signal.SIGKILL
     begun = time.monotonic()
     seen = []

@@ -43,7 +43,7 @@ def foxglove() -> Callable[..., list[dict]]:
             env={**os.environ, 'NODE_NO_WARNINGS': '1'},
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=120,
             check=False,
         )
         assert done.returncode == 0, done.stderr

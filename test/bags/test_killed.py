@@ -19,7 +19,7 @@ from disc_sim_ros.bags.writer import BagWriter
 
 RATE = 4000  # Hz
 LONGEST_LOSS = 1.0  # s, what is promised
-DEADLINE = 30.0  # s
+DEADLINE = 60.0  # s
 NOISE = Topic(name='/noise', type='std_msgs/msg/String', definition='string data')
 
 

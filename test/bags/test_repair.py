@@ -32,7 +32,7 @@ PROGRAM = Path(sys.executable).with_name('repair_bag')
 
 def run(*arguments) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [PROGRAM, *arguments], capture_output=True, text=True, check=False, timeout=60
+        [PROGRAM, *arguments], capture_output=True, text=True, check=False, timeout=120
     )
 
 
@@ -234,11 +234,11 @@ def test_ctrl_c_leaves_no_half_bag(tmp_path):
     for line in child.stderr:
         if 'writing' in line:
             break
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 60.0
     while not list(tmp_path.glob('.*.part/made/*.mcap')):
         assert time.monotonic() < deadline
     child.send_signal(signal.SIGINT)
-    out, error = child.communicate(timeout=30)
+    out, error = child.communicate(timeout=60)
     assert child.returncode == 130
     assert out == ''
     assert 'Traceback' not in error

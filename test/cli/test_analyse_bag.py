@@ -388,7 +388,7 @@ def test_help_tells_units_and_needs_no_ros():
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=120,
     )
     assert result.stdout.startswith('usage: analyse_bag')
     assert 'm/s' in result.stdout.replace('(m, s)', 'm/s')

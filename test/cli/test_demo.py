@@ -163,7 +163,7 @@ def test_without_ros_it_says_so_in_one_line():
             capture_output=True,
             text=True,
             check=False,
-            timeout=60,
+            timeout=120,
         )
         assert result.returncode == returned
         assert text in result.stdout + result.stderr

@@ -77,7 +77,7 @@ def test_without_ros_it_says_what_it_needs_in_one_line(tmp_path):
         f'sys.exit(main(["--bag", {str(tmp_path / "bag")!r}]))'
     )
     result = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, '-c', code], capture_output=True, text=True, check=False, timeout=120
     )
     refused((result.returncode, result.stdout, result.stderr), '--bag', 'ROS 2', 'rclpy')
 
@@ -103,7 +103,7 @@ def test_make_fly_throws_also_where_there_is_no_ros(tmp_path):
             capture_output=True,
             text=True,
             check=True,
-            timeout=60,
+            timeout=120,
         ).stdout
 
     program('tools/setup-venv', 'exit 0')

@@ -21,7 +21,7 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-DEADLINE = 20.0  # s of wall time for what takes less than one on an idle machine
+DEADLINE = 60.0  # s of wall time for what takes less than one on an idle machine
 ALL_QOS = QoSProfile(depth=100_000)  # reliable: a test that is slow to listen loses nothing
 
 
@@ -82,7 +82,7 @@ class Harness:
         self._folder = folder
         self._clients: dict[str, Client] = {}
         self._parameters: dict[SimProcess, AsyncParameterClient] = {}
-        self._reached: set[str] = set()  # names of simulators that know all clients
+        self._reached: set[str] = set()  # names of simulators that know all that was made
         self._heard: list[list[Any]] = []
         self._since = 0
 
@@ -136,6 +136,7 @@ class Harness:
 
         self.node.create_subscription(kind, topic, hear, qos, raw=raw)
         self._heard.append(heard)
+        self._reached.clear()
         return heard
 
     def forget(self) -> None:
@@ -147,11 +148,13 @@ class Harness:
     def publisher(self, kind: type, topic: str) -> Publisher:
         """Return a publisher that a simulator has subscribed to."""
         publisher = self.node.create_publisher(kind, topic, 1000)
+        self._reached.clear()
         self.spin_until(publisher.get_subscription_count, f'a subscriber of {topic}')
         return publisher
 
     def send(self, sim: SimProcess, publisher: Publisher, *messages: Any) -> None:
         """Publish messages to a simulator and wait until they are there."""
+        self._reach(sim)
         self.spin_until(publisher.get_subscription_count, f'a subscriber of {publisher.topic}')
         for message in messages:
             publisher.publish(message)
@@ -185,10 +188,11 @@ class Harness:
         return self._clients[name]
 
     def _reach(self, sim: SimProcess) -> None:
-        """Wait until a simulator can answer every client that has been made so far.
+        """Wait until a simulator knows all that has been made here so far.
 
-        A server drops its answer to a client that it does not know yet. Discovery keeps the order
-        of clients: when the youngest has been answered, the older ones will be.
+        It publishes to no subscription, and answers no client, that it does not know yet, and a
+        first command takes its time. Discovery keeps their order: when it has answered the
+        youngest client, it knows all that is older.
         """
         if sim.name in self._reached:
             return

@@ -85,8 +85,7 @@ def steered(ros, sim):
     message = Vector3Stamped()
     message.vector.x, message.vector.y, message.vector.z = CONTROL[:3]
     ros.send(sim, ros.publisher(Vector3Stamped, topics.CMD_COEFFICIENTS), message)
-    assert ros.call(sim, 'step').success
-    ros.spin_until(lambda: applied, 'the command')
+    ros.spin_until(lambda: ros.call(sim, 'step').success and applied, 'the command')
 
 
 def test_messages_and_topics_are_those_of_sim_node(ros, tmp_path):

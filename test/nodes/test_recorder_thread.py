@@ -42,11 +42,11 @@ def test_messages_are_refused_while_too_many_wait(thread, tmp_path, monkeypatch)
     assert not any(taken[kept:])
     assert 0 < thread.backlog <= 10_000
     thread.start()
-    thread.call(BagWriter.flush).result(10.0)
+    thread.call(BagWriter.flush).result(60.0)
     assert thread.backlog == 0
     assert thread.put(1, DATA, 100, 100)  # there is room again
     thread.end()
-    thread.join(10.0)
+    thread.join(60.0)
     assert thread.failure is None
     assert recorded(tmp_path) == kept + 1
 
@@ -55,7 +55,7 @@ def test_whatever_fails_the_bag_is_closed_and_the_reason_told(thread, tmp_path):
     assert thread.put(1, DATA, 1, 1)
     failed = thread.call(lambda _: 1 // 0)
     thread.start()
-    thread.join(10.0)
+    thread.join(60.0)
     with pytest.raises(BagError, match='ZeroDivisionError'):
         failed.result(0.0)
     assert 'ZeroDivisionError' in str(thread.failure)
@@ -74,7 +74,7 @@ def test_a_listener_rests_only_where_there_is_no_more_and_tells_why_it_ended():
 
     listener = Listener(take, 0.05)
     listener.start()
-    listener.join(10.0)
+    listener.join(60.0)
     assert 'no ears' in str(listener.failure)
     assert rounds[29] - rounds[20] >= 9 * 0.05
     listener.end()

@@ -807,7 +807,7 @@ def test_a_signal_ends_it_quietly_while_it_starts(ros_environment, tmp_path, num
     begun = time.monotonic()
     process.send_signal(number)
     process.send_signal(number)
-    assert process.wait(20.0) == 0
+    assert process.wait(DEADLINE) == 0
     assert time.monotonic() - begun < patience(2.0)
     assert 'Traceback' not in stderr.read_text()
 

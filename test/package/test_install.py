@@ -175,7 +175,6 @@ def test_importing_the_package_imports_nothing_heavy():
 
 
 @pytest.mark.packaging
-@pytest.mark.timeout(600)
 def test_pip_installs_all_files(pip_prefix):
     check_files(pip_prefix)
     check_package_data(next((pip_prefix / 'lib').glob('python3*/site-packages')))
@@ -209,7 +208,6 @@ def test_fly_flies_after_pip_without_a_place_for_compiled_code(pip_prefix):
 
 
 @pytest.mark.packaging
-@pytest.mark.timeout(600)
 def test_colcon_installs_all_files(colcon_workspace):
     prefix = colcon_workspace / 'install' / PACKAGE
     check_files(prefix)

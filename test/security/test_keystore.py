@@ -32,7 +32,7 @@ needs_openssl = pytest.mark.skipif(shutil.which('openssl') is None, reason='need
 
 def run(*arguments):
     return subprocess.run(
-        [str(a) for a in arguments], capture_output=True, text=True, check=False, timeout=60
+        [str(a) for a in arguments], capture_output=True, text=True, check=False, timeout=120
     )
 
 
