@@ -96,6 +96,7 @@ class Kept:
     def channel(self, kind, name, qos, wire=None):
         channel = type('Channel', (), {'heard': False})()
         channel.publish = self.messages.setdefault(name, []).append
+        channel.send = lambda *values: channel.publish(wire.pack(*values))
         return channel
 
 
