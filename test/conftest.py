@@ -10,7 +10,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first imported
 
 IN_REAL_TIME, MAKES_WAY = 0, 10  # niceness
-FIRST = {'test_sim_node_control', 'test_recorder', 'test_parameters'}  # half of those with nodes
+FIRST = {  # half of those with nodes
+    'test_sim_node_control', 'test_sim_node_input', 'test_sim_node_process', 'test_recorder',
+    'test_parameters', 'test_parameters_of_a_node',
+}  # fmt: skip
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks at the marks

@@ -1,0 +1,44 @@
+"""What the tests of commands share: `fly` in this process."""
+
+from collections.abc import Callable
+import json
+
+from cli.fly_command import Result
+import pytest
+
+from disc_sim_ros.cli import fly as program
+from disc_sim_ros.core import catalogue, flight
+from disc_sim_ros.core.launch import Launch
+
+
+@pytest.fixture(scope='module')
+def compiled():
+    """Compile first, so that no test sees the note about it."""
+    flight.fly(Launch(), flight.Setup(disc=catalogue.load('frisbee')))
+
+
+@pytest.fixture
+def fly(capsys) -> Callable[..., Result]:
+    """Run `fly` in this process."""
+
+    def run(*arguments: object) -> Result:
+        try:
+            code = program.main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            code = end.code
+        return Result(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def document(fly) -> Callable[..., dict]:
+    """Run `fly --json` and return what it printed."""
+
+    def run(*arguments: object) -> dict:
+        result = fly('--json', *arguments)
+        assert (result.code, result.err) == (0, '')
+        assert result.out.count('\n') == 1
+        return json.loads(result.out, parse_constant=pytest.fail)  # no NaN, no Infinity
+
+    return run
