@@ -128,17 +128,21 @@ def fly_again(flight: Flight) -> Reflight:
     off = np.abs(steps * NANOSECONDS / rate - (stamps - flight.start)) > _ROUNDED
     end = _landing_step(flight, rate, float(told['publish_rate']), int(steps[-1]))
     last = max(int(stamps[-1]), flight.start + math.floor(end * NANOSECONDS / rate))
-    changes = tuple(c for c in flight.disc.changes if flight.start <= c.stamp < last)
-    waiting = [(round((c.stamp - flight.start) * rate / NANOSECONDS), c) for c in changes]
+    waiting = [
+        (round((c.stamp - flight.start) * rate / NANOSECONDS), c, given_in)
+        for c in flight.disc.changes
+        if flight.start <= c.stamp < last and (given_in := _axes_of(c, flight)) is not None
+    ]
+    changes = tuple(c for _, c, _ in waiting)
     states, winds = np.full((len(steps), 14), np.nan), np.full((len(steps), 3), np.nan)
     lost = ''
     try:
         for row, step in enumerate([*steps.tolist(), end]):
             # A message tells of a step before what changes there.
             while waiting and waiting[0][0] < step:
-                at, change = waiting.pop(0)
+                at, change, given_in = waiting.pop(0)
                 _advance(sim, at)
-                _apply(sim, change)
+                _apply(sim, change, given_in)
             _advance(sim, step)
             if row < len(steps):
                 states[row], winds[row] = sim.state, sim.wind
@@ -214,6 +218,9 @@ def _doubts(flight: Flight, again: Reflight) -> list[str]:
     first, last = flight.motion.log[0], flight.motion.log[-1]
     if any(first <= at <= last for at in flight.disc.profile_changes):
         doubts.append('the profile of the wind was changed in flight, which no stamp tells of')
+    strange = {c.frame for c in flight.disc.changes if _axes_of(c, flight) is None}
+    if strange:
+        doubts.append(f'moments in {", ".join(map(repr, sorted(strange)))}: no frame of the disc')
     if again.off_grid:
         doubts.append(f'{again.off_grid} messages have stamps that are not at a step')
     if told and told.get('version') != __version__:
@@ -228,7 +235,15 @@ def _advance(sim: FlightSimulator, step: int) -> None:
         sim.advance(step - sim.steps)
 
 
-def _apply(sim: FlightSimulator, change: Change) -> None:
+def _axes_of(change: Change, flight: Flight) -> int | None:
+    """Return the axes that a change is given in; None for a frame that is not of the disc."""
+    if change.topic != 'applied_moment' or not change.frame:
+        return DISC_AIR
+    prefix = flight.disc.motion.child.removesuffix('disc')
+    return _AXES.get(change.frame.removeprefix(prefix))
+
+
+def _apply(sim: FlightSimulator, change: Change, given_in: int) -> None:
     x, y, z = change.values
     if change.topic == 'applied_wind':
         sim.set_wind(replace(sim.setup.wind, mean=axes.turned((x, y, z))))
@@ -236,8 +251,7 @@ def _apply(sim: FlightSimulator, change: Change) -> None:
         sim.take(sim.control._replace(C_L=x, C_M=y, C_N=z))
     else:
         L, M, N = axes.turned((x, y, z))  # noqa: N806 - the paper's
-        frame = _AXES[change.frame.rpartition('/')[2]] if change.frame else DISC_AIR
-        sim.take(sim.control._replace(L=L, M=M, N=N, axes=frame))
+        sim.take(sim.control._replace(L=L, M=M, N=N, axes=given_in))
 
 
 def _landing(sim: FlightSimulator) -> dict[str, float]:

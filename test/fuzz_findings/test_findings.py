@@ -147,6 +147,31 @@ def test_a_landing_that_tells_no_number_differs(steered):
     assert not verdict.exact
 
 
+def test_a_moment_in_a_frame_that_is_not_of_the_disc_is_left_out_and_told(steered):
+    flight = flight_of(steered)
+    changes = tuple(
+        replace(c, frame='disc_\x01') if c.topic == 'applied_moment' else c
+        for c in flight.disc.changes
+    )
+    changed = replace(flight, disc=replace(flight.disc, changes=changes))
+    verdict = refly.compare(changed, refly.fly_again(changed))
+    assert not verdict.exact
+    assert any(
+        "moments in 'disc_\\x01': no frame of the disc" in doubt for doubt in verdict.doubts
+    )
+
+
+@pytest.mark.parametrize('prefix', ['', 'red/', 'red_', 'disc', 'a/b/'])
+def test_moments_are_those_of_the_disc_whatever_its_prefix(tmp_path, prefix):
+    made = flight_bags.steered_bag(tmp_path / 'bag', frame_prefix=prefix)
+    flight = flight_of(made)
+    moments = [c for c in flight.disc.changes if c.topic == 'applied_moment']
+    assert {c.frame for c in moments} == {f'{prefix}disc_body', f'{prefix}disc_air'}
+    verdict = refly.compare(flight, refly.fly_again(flight))
+    assert verdict.exact
+    assert not verdict.doubts
+
+
 def test_the_bag_that_was_changed_is_still_analysed(steered, capsys):
     """The flights above are of a bag that `analyse_bag` finds exact."""
     assert analyse_bag.main([str(steered), '--verify', '--json']) == 0
