@@ -73,7 +73,7 @@ setup(
     maintainer_email='maintainers@disc-sim.example.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', 'core/discs/*.yaml', 'experiments/data/*']},
+    package_data={NAME: ['py.typed', 'physics/discs/*.yaml', 'paper/data/*']},
     data_files=data_files(),
     distclass=DataDistribution,
     zip_safe=False,

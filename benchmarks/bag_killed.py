@@ -14,10 +14,9 @@ import sys
 import tempfile
 import time
 
-from lines import Line, print_lines
-
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
+from lines import Line, print_lines
 
 CHILD = Path(__file__).parents[1] / 'test/bags/killed.py'
 KILLS = 24

@@ -14,17 +14,17 @@ import sys
 import tempfile
 import time
 
-from lines import Line, number, print_lines
 from mcap.writer import Writer
 from nav_msgs.msg import Odometry
 import numpy as np
 from rclpy.serialization import serialize_message
 
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.mcap_file import CHUNK_SIZE
+from disc_sim_ros.bags.mcap_writer import CHUNK_SIZE
 from disc_sim_ros.bags.qos import Qos
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
+from lines import Line, number, print_lines
 
 COUNT = 40_000
 ROUNDS = 5

@@ -1,10 +1,10 @@
 """How many flights at once, how exactly, and how time and memory grow with their number.
 
 Flights are throws of the paper's Fig. 5 with some scatter in speed, pitch and spin, flown by
-`disc_sim_ros.core.ensemble.fly_many`; beside it a loop of `flight.fly`, and the same equations in
-plain numpy (benchmarks/numpy_flights.py). Errors are of the landing point against an independent
-integration with a tolerance of 1e-12 (test/reference): of that throw, of the worst of its
-neighbours, and of the worst of three that are released wobbling or spin faster, whose nutation
+`disc_sim_ros.physics.ensemble.fly_many`; beside it a loop of `flight.fly`, and the same equations
+in plain numpy (benchmarks/numpy_flights.py). Errors are of the landing point against an
+independent integration with a tolerance of 1e-12 (test/reference): of that throw, of the worst of
+its neighbours, and of the worst of three that are released wobbling or spin faster, whose nutation
 asks for shorter steps. Rates per CPU-second are of one thread. The last lines are of the longest
 step that keeps Fig. 5 and its neighbours below 1 mm.
 
@@ -23,19 +23,19 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 
-from flights import ALLOWED, FIG_5, NEIGHBOURS, cpu_name, landing_of_reference, time_per_flight
-from lines import Line, number, print_lines
 import numba
 import numpy as np
+
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.ensemble import fly_many
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.launch import LIMITS, Launch
+from flights import ALLOWED, FIG_5, NEIGHBOURS, cpu_name, landing_of_reference, time_per_flight
+from lines import Line, number, print_lines
 import numpy_flights
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.ensemble import fly_many
-from disc_sim_ros.core.flight import Setup
-from disc_sim_ros.core.launch import LIMITS, Launch
-
 if TYPE_CHECKING:
-    from disc_sim_ros.core.disc import FloatArray
+    from disc_sim_ros.arrays import FloatArray
 
 STEPS = (1e-3, 5e-3, 1e-2, 2e-2, 3e-2, 3.5e-2)  # s
 NEAR = (*NEIGHBOURS, Launch(speed=13.0), Launch(speed=17.0, pitch=10.0), Launch(pitch=25.0))
@@ -57,7 +57,7 @@ def main() -> None:
 
 def lines(largest: float = 1e6) -> tuple[Line, ...]:
     """Measure up to so many flights, print tables and return what stands out."""
-    disc = catalogue.load('frisbee')
+    disc = disc_file.load_disc('frisbee')
     cores = os.cpu_count() or 1
     print(f'{cpu_name()}, {cores} cores; Python {platform.python_version()}, '
           f'numba {numba.__version__}, numpy {np.__version__}')  # fmt: skip

@@ -1,7 +1,7 @@
 """How many flights of the paper's Fig. 5 throw one core flies in a CPU-second, and how exactly.
 
-Each flight is one call of `disc_sim_ros.core.flight.fly`, from the launch to the landing, as any
-program would make it. Errors are of the landing point, against an independent integration with
+Each flight is one call of `disc_sim_ros.physics.flight.fly`, from the launch to the landing, as
+any program would make it. Errors are of the landing point, against an independent integration with
 a tolerance of 1e-12 (test/reference), and count in the worst of a few launches, not only the one
 that is timed. The last lines are the fastest step whose errors all stay below 1 mm, and the
 default one.
@@ -20,15 +20,15 @@ import time
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 
-from lines import Line, number, print_lines
 import numba
 import numpy as np
+
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
+from lines import Line, number, print_lines
 from reference.cases import FRISBEE
 from reference.reference_flight import reference_flight
-
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.launch import Launch
 
 STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 4e-2)  # s
 ALLOWED = 1e-3  # m
@@ -42,14 +42,16 @@ NEIGHBOURS = (FIG_5, Launch(speed=15.3), Launch(pitch=14.0), Launch(spin=-31.416
 def main() -> None:
     """Print what was measured."""
     if os.environ.get('NUMBA_DISABLE_JIT') == '1':
-        print(time_per_flight(Setup(disc=catalogue.load('frisbee'), step=STEPS[-1]), rounds=3))
+        print(
+            time_per_flight(Setup(disc=disc_file.load_disc('frisbee'), step=STEPS[-1]), rounds=3)
+        )
         return
     print_lines(lines())
 
 
 def lines() -> tuple[Line, ...]:
     """Measure every step, print a table and return what stands out."""
-    disc = catalogue.load('frisbee')
+    disc = disc_file.load_disc('frisbee')
     landings = [landing_of_reference(launch) for launch in NEIGHBOURS]
     print(f'{cpu_name()}, {os.cpu_count()} cores; Python {platform.python_version()}, '
           f'numba {numba.__version__}, numpy {np.__version__}')  # fmt: skip

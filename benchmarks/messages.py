@@ -18,27 +18,27 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 
-from disc_sim_ros.core.equations import Velocity
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes import conversions
-from disc_sim_ros.nodes.wire import Wire
+from disc_sim_ros.physics.kernels.equations import Velocity
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros import messages
+from disc_sim_ros.ros.cdr_template import CdrTemplate
 
 ROUNDS = 9
 ROUND_S = 0.05  # CPU seconds a round
 STAMP = (1_700_000_000, 123_456_789)
 STATE = Launch().state()
 FRESH: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
-    'Odometry': (lambda: Odometry(child_frame_id='disc'), conversions.ODOMETRY_FIELDS),
-    'PoseStamped': (PoseStamped, conversions.POSE_FIELDS),
+    'Odometry': (lambda: Odometry(child_frame_id='disc'), messages.ODOMETRY_FIELDS),
+    'PoseStamped': (PoseStamped, messages.POSE_FIELDS),
     'TransformStamped': (
         lambda: TransformStamped(child_frame_id='disc'),
-        conversions.TRANSFORM_FIELDS,
+        messages.TRANSFORM_FIELDS,
     ),
     'JointState': (
         lambda: JointState(name=['spin'], position=[0.0], velocity=[0.0]),
-        conversions.JOINT_FIELDS,
+        messages.JOINT_FIELDS,
     ),
-    'Imu': (Imu, conversions.IMU_FIELDS),
+    'Imu': (Imu, messages.IMU_FIELDS),
     'Float64': (Float64, ('data',)),
 }
 
@@ -62,7 +62,7 @@ def ways(make: Callable[[], Any], fields: tuple[str, ...]) -> list[Callable[[], 
     stamped = hasattr(make(), 'header')
     setter = writer(fields, stamped=stamped)
     message = named(make(), stamped=stamped)
-    pack = Wire(message, fields, ('header.stamp',) if stamped else ()).pack
+    pack = CdrTemplate(message, fields, ('header.stamp',) if stamped else ()).pack
 
     def fresh() -> bytes:
         new = named(make(), stamped=stamped)
@@ -103,24 +103,24 @@ def conversions_alone() -> dict[str, Callable[[], Any]]:
     """Return the conversions that run at the rate of publication."""
     still, none = Velocity(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     return {
-        'odometry(state), pose included': lambda: conversions.odometry(STATE),
-        'pose(state)': lambda: conversions.pose(STATE),
-        'spin_joint(state)': lambda: conversions.spin_joint(STATE),
-        'spin_transform(state)': lambda: conversions.spin_transform(STATE),
-        'imu(state, ...)': lambda: conversions.imu(STATE, none, none, none, 9.81),
-        'quantities(state, ...)': lambda: conversions.quantities(STATE, still, 0.275),
+        'odometry(state), pose included': lambda: messages.odometry(STATE),
+        'pose(state)': lambda: messages.pose(STATE),
+        'spin_joint(state)': lambda: messages.spin_joint(STATE),
+        'spin_transform(state)': lambda: messages.spin_transform(STATE),
+        'imu(state, ...)': lambda: messages.imu(STATE, none, none, none, 9.81),
+        'quantities(state, ...)': lambda: messages.quantities(STATE, still, 0.275),
     }
 
 
 def pair() -> Callable[[], Any]:
     """Return the hot path: one state to the bytes of an Odometry and of a PoseStamped."""
     odom, pose = (
-        Wire(named(FRESH[name][0](), stamped=True), FRESH[name][1]).pack
+        CdrTemplate(named(FRESH[name][0](), stamped=True), FRESH[name][1]).pack
         for name in ('Odometry', 'PoseStamped')
     )
 
     def both() -> tuple[bytes, bytes]:
-        values = conversions.odometry(STATE)
+        values = messages.odometry(STATE)
         return odom(*STAMP, *values), pose(*STAMP, *values[:7])
 
     return both

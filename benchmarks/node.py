@@ -20,14 +20,14 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from lines import Line, print_lines
 from nav_msgs.msg import Odometry
-from node_roles import DEEP, HIGH, TYPES
 import rclpy
 from rclpy.node import Node
 
-from disc_sim_ros.core.simulator import warm_up
-from disc_sim_ros.nodes import live
+from disc_sim_ros.physics.simulator import warm_up
+from disc_sim_ros.ros import processes
+from lines import Line, print_lines
+from node_roles import DEEP, HIGH, TYPES
 
 TICK = os.sysconf('SC_CLK_TCK')
 MOST_CPU = 15.0  # per cent of a core, with odom, pose and commands at 1 kHz
@@ -50,7 +50,7 @@ def lines(seconds: float = 10.0, *, topics_too: bool = False) -> tuple[Line, ...
         seconds: How long to measure each.
         topics_too: Also print what each optional topic costs.
     """
-    with live.own_domain():
+    with processes.own_domain():
         return _lines(seconds, topics_too=topics_too)
 
 
@@ -210,7 +210,7 @@ def started(
         f'physics_rate:={float(physics)}', f'publish_rate:={float(publish)}',
         f'launch.height:={HIGH}', 'ground:=false', 'command_timeout:=0.5', *more,
     )  # fmt: skip
-    command = [sys.executable, '-m', 'disc_sim_ros.nodes.sim_node', '--ros-args']
+    command = [sys.executable, '-m', 'disc_sim_ros.ros.sim.node', '--ros-args']
     for parameter in parameters:
         command += ['-p', parameter]
     with ended(subprocess.Popen(command, env={**os.environ, **environment})) as process:

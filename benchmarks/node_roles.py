@@ -14,12 +14,13 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.equations import Control
-from disc_sim_ros.core.flight import Setup
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.core.simulator import FlightSimulator
-from disc_sim_ros.nodes import conversions, topics
+from disc_sim_ros import topics
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.simulator import FlightSimulator
+from disc_sim_ros.ros import messages
 
 DEEP = QoSProfile(depth=1000)
 TYPES = {
@@ -72,7 +73,7 @@ def naive(rate: str) -> None:
     """Be the node that one writes first."""
     rclpy.init()
     node = rclpy.create_node('naive')
-    setup = Setup(disc=catalogue.load('frisbee'), step=1.0 / float(rate))
+    setup = Setup(disc=disc_file.load_disc('frisbee'), step=1.0 / float(rate))
     sim = FlightSimulator(setup, Launch(height=HIGH).state(), ground=False)
     odom = node.create_publisher(Odometry, 'odom', DEEP)
     pose = node.create_publisher(PoseStamped, 'pose', DEEP)
@@ -83,7 +84,7 @@ def naive(rate: str) -> None:
     def on_timer() -> None:
         sim.advance(1)
         stamp = node.get_clock().now().to_msg()
-        x, y, z, qx, qy, qz, qw, *twist = conversions.odometry(sim.state)
+        x, y, z, qx, qy, qz, qw, *twist = messages.odometry(sim.state)
         at = PoseStamped()
         at.header.stamp, at.header.frame_id = stamp, 'map'
         at.pose.position.x, at.pose.position.y, at.pose.position.z = x, y, z

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from disc_sim_ros.core.axes import rotation_elements
+from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
 if TYPE_CHECKING:
-    from disc_sim_ros.core.disc import FloatArray
-    from disc_sim_ros.core.flight import Setup
+    from disc_sim_ros.arrays import FloatArray
+    from disc_sim_ros.physics.flight import Setup
 
 
 def fly(states: 'FloatArray', setup: 'Setup') -> 'FloatArray':

@@ -14,11 +14,10 @@ import math
 import sys
 import time
 
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
 from lines import Line, number, print_lines
-
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.launch import Launch
 
 SPEED, SPIN, HEIGHT, SECONDS = 15.0, 31.416, 50.0, 3.0  # m/s, rad/s, m, s
 Point = tuple[float, float, float]
@@ -36,8 +35,8 @@ def rate(flight: Callable[[], Point], seconds: float) -> float:
 
 def ours(step: float, **inertia: float) -> Callable[[], Point]:
     """Return a flight of this package."""
-    document = catalogue.document(catalogue.load('frisbee')) | inertia
-    setup = Setup(disc=catalogue.from_document('frisbee', document), step=step)
+    document = disc_file.disc_document(disc_file.load_disc('frisbee')) | inertia
+    setup = Setup(disc=disc_file.disc_from_document('frisbee', document), step=step)
     launch = Launch(speed=SPEED, spin=SPIN, height=HEIGHT)
 
     def flown() -> Point:

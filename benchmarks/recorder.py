@@ -13,7 +13,6 @@ import sys
 import tempfile
 import time
 
-from lines import Line, number, print_lines
 from mcap.writer import Writer
 from nav_msgs.msg import Odometry
 import rclpy
@@ -25,10 +24,12 @@ from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.nodes import conversions, live
-from disc_sim_ros.nodes.bag_thread import BagThread
-from disc_sim_ros.nodes.topics import STATE_QOS
-from disc_sim_ros.nodes.wire import Wire
+from disc_sim_ros.ros import messages as conversions
+from disc_sim_ros.ros import processes
+from disc_sim_ros.ros.cdr_template import CdrTemplate
+from disc_sim_ros.ros.qos import STATE_QOS
+from disc_sim_ros.ros.recorder.writer_thread import BagThread
+from lines import Line, number, print_lines
 
 RATE = 10_000  # Hz
 BURST = 0.001  # s between two bursts of messages
@@ -58,7 +59,7 @@ def publish(seconds: float) -> None:
     rclpy.init()
     node = Node('publisher')
     publisher = node.create_publisher(Odometry, 'odom', STATE_QOS)
-    pack = Wire(odometry(), conversions.ODOMETRY_FIELDS).pack
+    pack = CdrTemplate(odometry(), conversions.ODOMETRY_FIELDS).pack
     rest = (0.0,) * (len(conversions.ODOMETRY_FIELDS) - 1)
     while not publisher.get_subscription_count():
         time.sleep(0.05)
@@ -173,10 +174,10 @@ def main() -> None:
 
 def lines(seconds: float = 60.0) -> tuple[Line, ...]:
     """Record for some time, and write as much as can be written."""
-    with tempfile.TemporaryDirectory() as scratch, live.own_domain():
+    with tempfile.TemporaryDirectory() as scratch, processes.own_domain():
         folder = Path(scratch)
         total = round(seconds * RATE)
-        ours = [sys.executable, '-m', 'disc_sim_ros.nodes.recorder_node', '--ros-args']
+        ours = [sys.executable, '-m', 'disc_sim_ros.ros.recorder.node', '--ros-args']
         ours += ['-p', f'bag:={folder / "bag"}', '-p', 'topics:=/odom']
         share, memory, rate = measured(ours, seconds)
         bag = open_bag(folder / 'bag')

@@ -10,14 +10,14 @@ Forces and moments are those of `core` in all three; still air, no control, the 
 import math
 from typing import TYPE_CHECKING
 
-from disc_sim_ros.core import equations
-from disc_sim_ros.core._jit import entry, inline, jit
-from disc_sim_ros.core.axes import rotation_elements
-from disc_sim_ros.core.equations import Control, Plant, State, Velocity
-from disc_sim_ros.core.rk4 import moved
+from disc_sim_ros.physics.kernels import equations
+from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
+from disc_sim_ros.physics.kernels.jit import entry, inline, jit
+from disc_sim_ros.physics.kernels.rk4 import axpy
+from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
 if TYPE_CHECKING:
-    from disc_sim_ros.core.disc import FloatArray
+    from disc_sim_ros.arrays import FloatArray
 
 DESPUN, SPINNING, PRINTED = range(3)
 STILL = Velocity(0.0, 0.0, 0.0)
@@ -100,10 +100,10 @@ def flown(
     for i in range(n):
         h = step if i < n - 1 else duration - i * step
         k1 = derivative(s, axes, plant, table, spin_terms)
-        k2 = derivative(moved(s, 0.5 * h, k1), axes, plant, table, spin_terms)
-        k3 = derivative(moved(s, 0.5 * h, k2), axes, plant, table, spin_terms)
-        k4 = derivative(moved(s, h, k3), axes, plant, table, spin_terms)
-        s = moved(s, h / 6.0, moved(moved(moved(k1, 2.0, k2), 2.0, k3), 1.0, k4))
+        k2 = derivative(axpy(s, 0.5 * h, k1), axes, plant, table, spin_terms)
+        k3 = derivative(axpy(s, 0.5 * h, k2), axes, plant, table, spin_terms)
+        k4 = derivative(axpy(s, h, k3), axes, plant, table, spin_terms)
+        s = axpy(s, h / 6.0, axpy(axpy(axpy(k1, 2.0, k2), 2.0, k3), 1.0, k4))
         n_e = 1.0 / math.sqrt(s.e0 * s.e0 + s.e1 * s.e1 + s.e2 * s.e2 + s.e3 * s.e3)
         s = State(s.X, s.Y, s.Z, s.VX, s.VY, s.VZ, s.e0 * n_e, s.e1 * n_e, s.e2 * n_e, s.e3 * n_e,
                   s.p, s.q, s.r, s.sigma)  # fmt: skip

@@ -20,17 +20,17 @@ import time
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 
-from lines import Line, number, print_lines
 import numpy as np
+from scipy.integrate import solve_ivp
+
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
+from lines import Line, number, print_lines
 from reference.cases import FRISBEE
 from reference.reference_flight import reference_flight
-from scipy.integrate import solve_ivp
 from spinning import DESPUN, PRINTED, SPINNING, flown, rates, released
-
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.errors import ConfigError
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.launch import Launch
 
 DOCS = Path(__file__).parents[1] / 'docs'
 LAUNCHES = {
@@ -84,7 +84,7 @@ def main() -> None:
 
 def lines(*, write: bool = False) -> tuple[Line, ...]:
     """Measure and print every flight; return what the despun axes are worth."""
-    setup = Setup(disc=catalogue.load('frisbee'))
+    setup = Setup(disc=disc_file.load_disc('frisbee'))
     throws = [landed(name, launch) for name, launch in LAUNCHES.items()]
     for throw in throws:
         check(throw, setup)
@@ -230,7 +230,7 @@ def picture(points: list[Point]) -> bytes:
     """Return the PNG: a panel for each launch, a curve for each kind of axes."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - a second, for the picture alone
 
-    from disc_sim_ros.experiments.drawing import LIGHT, image, style  # noqa: PLC0415
+    from disc_sim_ros.paper.style import LIGHT, image, style  # noqa: PLC0415
 
     looks = {
         'despun': (LIGHT.printed, 'o', 'axes that do not spin (this package)'),

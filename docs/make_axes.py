@@ -1,7 +1,7 @@
 """Draw the axes of docs/axes.md: `python docs/make_axes.py [FOLDER]`, by default this folder.
 
-Every arrow and arc follows from disc_sim_ros.core.axes: vectors are given in the axes that define
-them, rotated by its matrices and then projected. Nothing is placed by hand but labels.
+Every arrow and arc follows from disc_sim_ros.physics.frames: vectors are given in the axes that
+define them, rotated by its matrices and then projected. Nothing is placed by hand but labels.
 """
 # ruff: noqa: N803, N806 - R and V are the paper's letters
 
@@ -19,8 +19,9 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 from numpy.typing import ArrayLike
 
-from disc_sim_ros.core import axes
-from disc_sim_ros.core.axes import FloatArray
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.kernels import rotation
 
 # Okabe and Ito: safe for colour-blind readers. Line styles tell the same without colour.
 PAPER, MESSAGE, TURN, ANGLE = '#d55e00', '#0072b2', '#009e73', '#cc79a7'
@@ -42,7 +43,7 @@ Projection = Callable[[ArrayLike], FloatArray]
 
 def columns(phi: float = 0.0, theta: float = 0.0, psi: float = 0.0) -> FloatArray:
     """Return x, y, z of axes turned by yaw, pitch, roll [degrees], as columns in the old axes."""
-    return axes.rotation_matrix(axes.quaternion_from_euler(phi, theta, psi))
+    return frames.rotation_matrix(frames.quaternion_from_euler(phi, theta, psi))
 
 
 def axes_3(beta: float) -> FloatArray:
@@ -57,7 +58,7 @@ def axes_4(alpha: float) -> FloatArray:
 
 def message_axes(paper: FloatArray) -> FloatArray:
     """Return REP-103 axes beside the given ones, columns in the same old axes."""
-    return paper @ axes.map_from_paper(np.eye(3))
+    return paper @ frames.map_from_paper(np.eye(3))
 
 
 def onto(right: ArrayLike, up: ArrayLike) -> Projection:
@@ -68,10 +69,10 @@ def onto(right: ArrayLike, up: ArrayLike) -> Projection:
 
 def seen_from(azimuth: float, elevation: float) -> Projection:
     """Return the projection for an eye in this direction in `map` [degrees], z up on the page."""
-    c_a, s_a = axes.cos_sin_degrees(azimuth)
-    c_e, s_e = axes.cos_sin_degrees(elevation)
+    c_a, s_a = rotation.cos_sin_degrees(azimuth)
+    c_e, s_e = rotation.cos_sin_degrees(elevation)
     page = onto((-s_a, c_a, 0.0), (-s_e * c_a, -s_e * s_a, c_e))
-    return lambda points: page(axes.map_from_paper(points))
+    return lambda points: page(frames.map_from_paper(points))
 
 
 def circle(first: ArrayLike, second: ArrayLike, start: float, end: float) -> FloatArray:

@@ -19,8 +19,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from disc_sim_ros import topics
 from disc_sim_ros.cli.arguments import number
-from disc_sim_ros.nodes import live, topics
+from disc_sim_ros.ros import client, processes, qos
 
 PATIENCE = 30.0  # s, for the simulator to be found and to answer
 ENDS = ('landed', 'failed', 'reset')
@@ -35,7 +36,7 @@ class Flier(Node):
         self._spinner = SingleThreadedExecutor(context=context)
         self._spinner.add_node(self)
         self.create_subscription(
-            DiagnosticStatus, topics.FLIGHT_EVENTS, self._on_event, topics.STATE_QOS
+            DiagnosticStatus, topics.FLIGHT_EVENTS, self._on_event, qos.STATE_QOS
         )
         self._service = self.create_client(Trigger, 'sim_node/throw')
 
@@ -86,13 +87,13 @@ def recorded(parameters: Mapping[str, object], bag: Path, pace: float) -> Iterat
         DiscSimError: One of them fails.
     """
     with ExitStack() as stack:
-        domain = stack.enter_context(live.own_domain())
+        domain = stack.enter_context(processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='example_')))
         waiting = {'auto_throw': False, 'real_time_factor': pace, **parameters}
-        sim = stack.enter_context(live.started('sim_node', waiting, folder))
+        sim = stack.enter_context(processes.started('sim_node', waiting, folder))
         to = {'bag': str(bag.absolute()), 'start_paused': True}
-        recorder = stack.enter_context(live.started('recorder_node', to, folder))
-        watcher = live.Watcher(domain, (sim, recorder))
+        recorder = stack.enter_context(processes.started('recorder_node', to, folder))
+        watcher = client.Watcher(domain, (sim, recorder))
         try:
             watcher.wait_until_recorded(bag)
         finally:

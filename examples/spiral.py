@@ -15,19 +15,15 @@ import sys
 
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from rclpy.context import Context
-import session
-from session import Flier
 
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.derived import spin_rate
-from disc_sim_ros.core.errors import DiscSimError
-from disc_sim_ros.nodes.topics import (
-    APPLIED_COEFFICIENTS,
-    CMD_COEFFICIENTS,
-    COMMAND_QOS,
-    STATE_QOS,
-)
+from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.theory import spin_rate
+from disc_sim_ros.ros.qos import COMMAND_QOS, STATE_QOS
+from disc_sim_ros.topics import APPLIED_COEFFICIENTS, CMD_COEFFICIENTS
+import session
+from session import Flier
 
 RATE = 50.0  # Hz
 TIMEOUT = 10.0  # s of simulated time; the paper's moment is constant, however late a renewal is
@@ -77,7 +73,7 @@ class Commander(Flier):
 
 def parameters(manoeuvre: Manoeuvre) -> dict[str, object]:
     """Return the parameters of a sim_node that throws so."""
-    diameter = catalogue.load('frisbee').diameter
+    diameter = disc_file.load_disc('frisbee').diameter
     spin = spin_rate(manoeuvre.advance_ratio, diameter, manoeuvre.launch['speed'])
     launch = {**manoeuvre.launch, 'spin': spin}
     return {f'launch.{name}': value for name, value in launch.items()} | {

@@ -17,29 +17,24 @@ from nav_msgs.msg import Odometry
 import numpy as np
 from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-import session
-from session import Flier
 from std_msgs.msg import String
 import yaml
 
-from disc_sim_ros.cli import throw_flags
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.cli import flags
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.core import axes, catalogue
-from disc_sim_ros.core.air import Wind
-from disc_sim_ros.core.disc import Disc, FloatArray
-from disc_sim_ros.core.equations import Control, State
-from disc_sim_ros.core.errors import DiscSimError
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.simulator import FlightSimulator
-from disc_sim_ros.nodes.conversions import release_from_odometry
-from disc_sim_ros.nodes.topics import (
-    CMD_COEFFICIENTS,
-    COMMAND_QOS,
-    CONFIGURATION,
-    LATCHED_QOS,
-    ODOM,
-    Frames,
-)
+from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics import disc_file, frames
+from disc_sim_ros.physics.disc import Disc
+from disc_sim_ros.physics.environment import Wind
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.kernels.equations import Control, State
+from disc_sim_ros.physics.simulator import FlightSimulator
+from disc_sim_ros.ros.messages import release_from_odometry
+from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS
+from disc_sim_ros.topics import CMD_COEFFICIENTS, CONFIGURATION, ODOM, Frames
+import session
+from session import Flier
 
 PERIOD = 0.02  # s, between two plans
 LIMIT = 0.05  # of C_L and C_M; the paper's spiral turn takes 0.1
@@ -175,7 +170,7 @@ class Navigator(Flier):
     def __init__(self, target: tuple[float, float], context: Context) -> None:
         super().__init__('navigator', context)
         self.pilot: Pilot | None = None
-        self._target = axes.paper_from_map((*target, 0.0))[:2]
+        self._target = frames.paper_from_map((*target, 0.0))[:2]
         self._frames = Frames()
         self._seen = False
         self._released = self._planned = 0  # ns
@@ -190,7 +185,7 @@ class Navigator(Flier):
     def _on_throw(self, configuration: String) -> None:
         """Board the disc that was thrown: its properties come with the throw."""
         document = yaml.safe_load(configuration.data)
-        disc = catalogue.from_document(document['disc'], document['disc_file'])
+        disc = disc_file.disc_from_document(document['disc'], document['disc_file'])
         self.pilot = Pilot(disc, self._target)
         self._released = self._planned = 0
 
@@ -220,9 +215,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help='where to land, m in map: x forward, y left (default 26 0)',
     )
     session.add_options(parser)
-    throw_flags.add_disc(parser)
-    throw_flags.add_launch(parser)
-    throw_flags.add_air(parser, 'air')
+    flags.add_disc(parser)
+    flags.add_launch(parser)
+    flags.add_air(parser, 'air')
     return parser.parse_args(arguments)
 
 
@@ -231,8 +226,8 @@ def main(arguments: list[str] | None = None) -> int:
     options = parse(arguments)
     folder = session.folder_of(options, 'steer_to_target')
     try:
-        launch, setup = throw_flags.thrown(options)
-        parameters = throw_flags.parameters(options, launch, setup)
+        launch, setup = flags.thrown(options)
+        parameters = flags.parameters(options, launch, setup)
         with session.recorded(parameters, folder / 'bag', options.pace) as context:
             navigator = Navigator(tuple(options.target), context)
             landing = navigator.fly()
@@ -245,7 +240,7 @@ def main(arguments: list[str] | None = None) -> int:
     unsteered = fly(launch, setup).position
     session.show(folder)
     x, y = float(landing['landing_x_m']), float(landing['landing_y_m'])
-    wind = axes.map_from_paper((*navigator.pilot.wind, 0.0))
+    wind = frames.map_from_paper((*navigator.pilot.wind, 0.0))
     print(f'unsteered, it misses by {math.dist(unsteered[:2], options.target):.2f} m')
     print(f'steered, it lands at x {x:.2f} m, y {y:.2f} m', end=', ')
     print(f'{math.dist((x, y), options.target):.2f} m from the target')

@@ -15,9 +15,9 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 import yaml
 
-from disc_sim_ros.nodes import topics
-from disc_sim_ros.nodes.entry import Entry, allowed_text, plain
-from disc_sim_ros.nodes.parameter_table import TABLE
+from disc_sim_ros import topics
+from disc_sim_ros.ros.parameter_spec import ParameterSpec, allowed_text, plain
+from disc_sim_ros.ros.sim.parameters import TABLE
 
 SHARE = Path(__file__).parents[1]  # launch/, config/, rviz/ and urdf/ are side by side there
 NOT_GIVEN = ''
@@ -49,7 +49,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([*own, *passed_on, OpaqueFunction(function=nodes)])
 
 
-def description(entry: Entry) -> str:
+def description(entry: ParameterSpec) -> str:
     """Return what a parameter means, what is allowed, and its default."""
     allowed = f'{allowed_text(entry)} {entry.unit}'.strip()
     parts = (allowed, entry.constraint, f'default {plain(entry.default)!r}')

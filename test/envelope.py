@@ -10,15 +10,15 @@ from hypothesis import HealthCheck, assume, event, reject, settings
 from hypothesis import strategies as st
 import numpy as np
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.air import Wind
-from disc_sim_ros.core.equations import DISC, DISC_AIR, DISC_BODY, Control
-from disc_sim_ros.core.errors import ConfigError, IntegrationError
-from disc_sim_ros.core.flight import MODELS, MOMENT_AXES, NO_CONTROL, Setup, fly
-from disc_sim_ros.core.launch import LIMITS, Launch
-from disc_sim_ros.core.simulator import FlightSimulator
+from disc_sim_ros.errors import ConfigError, IntegrationError
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.environment import Wind
+from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, NO_CONTROL, Setup, fly
+from disc_sim_ros.physics.kernels.equations import DISC, DISC_AIR, DISC_BODY, Control
+from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.simulator import FlightSimulator
 
-DISCS = {name: catalogue.load(name) for name in catalogue.names()}
+DISCS = {name: disc_file.load_disc(name) for name in disc_file.disc_names()}
 ANGLES = (0.0, 90.0, -90.0, 180.0, -180.0, 89.999, 1e-9, -1e-300)
 
 

@@ -3,11 +3,11 @@
 from concurrent.futures import ProcessPoolExecutor, wait
 import multiprocessing
 
-from disc_sim_ros.core import catalogue, flight, simulator
-from disc_sim_ros.core.ensemble import fly_many
-from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.physics import disc_file, flight, simulator
+from disc_sim_ros.physics.ensemble import fly_many
+from disc_sim_ros.physics.launch import Launch
 
-SETUP = flight.Setup(disc=catalogue.load('frisbee'))
+SETUP = flight.Setup(disc=disc_file.load_disc('frisbee'))
 
 
 def of_one_flight() -> None:

@@ -6,12 +6,12 @@ import disc_files
 import flown
 import numpy as np
 
-from disc_sim_ros.analysis import recording, refly
-from disc_sim_ros.analysis.motion import Motion
-from disc_sim_ros.core.errors import DiscSimError
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes.configuration import configuration_text
-from disc_sim_ros.nodes.sim_config import configuration
+from disc_sim_ros.analysis import recording, resimulate
+from disc_sim_ros.analysis.odometry import Motion
+from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics.flight_config import configuration_text
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros.sim.config import configuration
 
 NAME = 'configurations'
 WORDS = (
@@ -31,7 +31,15 @@ def seeds() -> list[bytes]:
     found = []
     for disc, model in (('frisbee', 'exact'), ('wraith', 'precession'), ('flat_plate', 'exact')):
         config = configuration({'disc': disc, 'model': model, 'wind.turbulence': 5.0})
-        text = configuration_text(config, config.setup, Launch().state(), 1)
+        text = configuration_text(
+            config.setup,
+            Launch().state(),
+            1,
+            physics_rate=config.physics_rate,
+            publish_rate=config.publish_rate,
+            ground=config.ground,
+            command_timeout=config.command_timeout,
+        )
         found.append(text.encode())
     return found
 
@@ -49,12 +57,12 @@ def one(data: bytes) -> None:
     if _is_slow(document):
         return
     try:
-        again = refly.fly_again(flight)
+        again = resimulate.fly_again(flight)
     except DiscSimError as error:
         if '\n' in str(error):
             raise AssertionError(f'not one line: {error}') from None
         return
-    refly.compare(flight, again)
+    resimulate.compare(flight, again)
     if not again.lost:
         for state in again.states:
             flown.require_sound(type(again.release)(*state.tolist()))

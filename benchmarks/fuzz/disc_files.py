@@ -8,10 +8,10 @@ import flown
 import scratch
 import yaml
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.errors import ConfigError
-from disc_sim_ros.core.flight import MODELS, MOMENT_AXES, Setup
-from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, Setup
+from disc_sim_ros.physics.launch import Launch
 
 NAME = 'disc_files'
 WORDS = (
@@ -31,11 +31,11 @@ _FILE = scratch.folder() / 'disc.yaml'
 def seeds() -> list[bytes]:
     """Return every disc of the catalogue, as its file and as a complete document."""
     found = []
-    for name in catalogue.names():
-        disc = catalogue.load(name)
-        found.append(yaml.safe_dump(catalogue.document(disc)).encode())
+    for name in disc_file.disc_names():
+        disc = disc_file.load_disc(name)
+        found.append(yaml.safe_dump(disc_file.disc_document(disc)).encode())
         found.append(f'based_on: {name}\nmass_kg: 0.2\ndamping: {{C_Lp: -0.4}}\n'.encode())
-        path = Path(catalogue.__file__).parent / 'discs' / f'{name}.yaml'
+        path = Path(disc_file.__file__).parent / 'discs' / f'{name}.yaml'
         found.append(path.read_bytes())
     return found
 
@@ -44,14 +44,14 @@ def one(data: bytes) -> None:
     """Load one file; what loads must survive its own document and fly."""
     _FILE.write_bytes(data)
     try:
-        disc = catalogue.load(str(_FILE))
+        disc = disc_file.load_disc(str(_FILE))
     except ConfigError as error:
         if '\n' in str(error):
             raise AssertionError(f'not one line: {error}') from None
         return
-    document = catalogue.document(disc)
-    again = catalogue.from_document(disc.name, document)
-    if catalogue.document(again) != document:
+    document = disc_file.disc_document(disc)
+    again = disc_file.disc_from_document(disc.name, document)
+    if disc_file.disc_document(again) != document:
         raise AssertionError('the document of a disc makes another disc')
     choice = len(data)
     setup = Setup(

@@ -12,7 +12,6 @@ import scratch
 
 sys.path.insert(0, str(Path(__file__).parents[2] / 'test' / 'analysis'))
 import bags as flights
-
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli import analyse_bag

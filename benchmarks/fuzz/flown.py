@@ -2,10 +2,10 @@
 
 import math
 
-from disc_sim_ros.core.equations import Control, State
-from disc_sim_ros.core.errors import ConfigError, IntegrationError
-from disc_sim_ros.core.flight import NO_CONTROL, Setup
-from disc_sim_ros.core.simulator import FlightSimulator, warm_up
+from disc_sim_ros.errors import ConfigError, IntegrationError
+from disc_sim_ros.physics.flight import NO_CONTROL, Setup
+from disc_sim_ros.physics.kernels.equations import Control, State
+from disc_sim_ros.physics.simulator import FlightSimulator, warm_up
 
 STEPS = 100
 warm_up()  # or the first input would wait for the compiler, which looks like a hang

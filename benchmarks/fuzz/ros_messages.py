@@ -9,20 +9,20 @@ from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.air import Wind
-from disc_sim_ros.core.equations import Control, State
-from disc_sim_ros.core.errors import ConfigError
-from disc_sim_ros.core.flight import MODELS, Setup
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes import conversions
-from disc_sim_ros.nodes.commands import MOST_WAITING, Commands, Topic, due
-from disc_sim_ros.nodes.topics import Frames
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.environment import Wind
+from disc_sim_ros.physics.flight import MODELS, Setup
+from disc_sim_ros.physics.kernels.equations import Control, State
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros import messages
+from disc_sim_ros.ros.sim.commands import MOST_WAITING, Commands, Topic, pop_due
+from disc_sim_ros.topics import Frames
 
 NAME = 'ros_messages'
 WORDS = ('map', 'disc', 'disc_body', 'disc_air', 'red/disc', '\x00\x01\x00\x00')
 _FRAMES = Frames()
-_DISC = catalogue.load('frisbee_roll_moment')
+_DISC = disc_file.load_disc('frisbee_roll_moment')
 _TYPES = (WrenchStamped, Vector3Stamped, Vector3Stamped, Odometry)
 _DOUBLES = (
     0.0, -0.0, 1.0, -1.0, float('nan'), float('inf'), -float('inf'), 1e308, 5e-324, 1e-200, 1e3,
@@ -68,7 +68,7 @@ def one(data: bytes) -> None:
         if '\n' in str(error):
             raise AssertionError(f'not one line: {error}') from None
         return
-    value = due(topic, 2**63)
+    value = pop_due(topic, 2**63)
     if value is None or len(topic.waiting) > MOST_WAITING:
         raise AssertionError(f'an accepted command never acts: {message}')
     model = tuple(MODELS)[len(data) % 3]
@@ -82,7 +82,7 @@ def one(data: bytes) -> None:
         wind = Wind(mean=value)
     else:
         release = State(*value)
-        conversions.odometry(release)
+        messages.odometry(release)
     flown.fly_on(Setup(disc=_DISC, model=model, wind=wind), release, control)
 
 

@@ -33,7 +33,7 @@ CORE = Path(__file__).parents[2] / 'disc_sim_ros' / 'core'
 CHECKS = {'catalogue', 'check', 'disc', 'errors', 'launch'}  # of what comes from outside
 # numba compiles much of the rest: instrumented it would be no longer what flies.
 COMPILED = tuple(
-    f'disc_sim_ros.core.{path.stem}' for path in CORE.glob('*.py') if path.stem not in CHECKS
+    f'disc_sim_ros.physics.{path.stem}' for path in CORE.glob('*.py') if path.stem not in CHECKS
 )
 INSTRUMENTED = ('disc_sim_ros', 'mcap', 'mcap_ros2')  # and what a target names beside
 MORE_INSTRUMENTED = {'disc_files': ('yaml',)}  # it makes all else ten times slower

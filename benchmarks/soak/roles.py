@@ -15,7 +15,8 @@ from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64
 
-from disc_sim_ros.nodes import topics
+from disc_sim_ros import topics
+from disc_sim_ros.ros import qos
 
 COMMAND_RATE = 50.0  # Hz
 SWAY = (0.004, 0.003)  # C_L, C_M at most
@@ -30,7 +31,7 @@ def pilot() -> None:
     """Send coefficients that sway, 50 times a second."""
     rclpy.init()
     node = rclpy.create_node('pilot')
-    send = node.create_publisher(Vector3Stamped, topics.CMD_COEFFICIENTS, topics.COMMAND_QOS)
+    send = node.create_publisher(Vector3Stamped, topics.CMD_COEFFICIENTS, qos.COMMAND_QOS)
     message, begun, sent = Vector3Stamped(), time.monotonic(), 0
     while True:
         now = time.monotonic() - begun
@@ -46,7 +47,7 @@ def listener() -> None:
     rclpy.init()
     node = rclpy.create_node('listener')
     for name, kind in HEARD.items():
-        node.create_subscription(kind, name, lambda _: None, topics.STATE_QOS)
+        node.create_subscription(kind, name, lambda _: None, qos.STATE_QOS)
     rclpy.spin(node)
 
 
@@ -55,7 +56,7 @@ def guests() -> None:
     while True:
         rclpy.init()
         node = rclpy.create_node('guest')
-        node.create_subscription(Odometry, topics.ODOM, lambda _: None, topics.STATE_QOS)
+        node.create_subscription(Odometry, topics.ODOM, lambda _: None, qos.STATE_QOS)
         end = time.monotonic() + STAY
         while time.monotonic() < end:
             rclpy.spin_once(node, timeout_sec=STAY)

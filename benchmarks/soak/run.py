@@ -39,12 +39,12 @@ import numpy as np
 from resources import Sample, sample
 from watcher import Values, Watcher
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.air import Wind
-from disc_sim_ros.core.ensemble import fly_many
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes import live
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.ensemble import fly_many
+from disc_sim_ros.physics.environment import Wind
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros import processes as node_processes
 
 PERIOD = 5.0  # s from throw to throw; the flight of Fig. 5 takes 3.7
 GUSTS = 3.0  # m/s at 6 m, as `wind.turbulence`
@@ -75,7 +75,7 @@ def main() -> int:
     chosen = parser.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
-        domain = stack.enter_context(live.own_domain())
+        domain = stack.enter_context(node_processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='soak_')))
         place = stack, domain, folder
         if chosen.what == 'full':
@@ -93,7 +93,7 @@ def full(stack: ExitStack, domain: int, folder: Path, hours: float, out: Path) -
     watcher = Watcher(domain, rate=SLOW)
     stack.callback(watcher.close)
     parameters = {**PARAMETERS, 'real_time_factor': 0.0, 'publish_rate': SLOW}
-    sim = stack.enter_context(live.started('sim_node', parameters, folder))
+    sim = stack.enter_context(node_processes.started('sim_node', parameters, folder))
     watcher.spin_until(lambda: 'sim_node' in watcher.told, START, 'sim_node')
     watcher.call('sim_node/throw')
     count, begun, samples = round(hours * 3600.0 / PERIOD), time.monotonic(), []
@@ -121,9 +121,9 @@ def real(stack: ExitStack, domain: int, folder: Path, minutes: float, out: Path)
     stack.callback(watcher.close)
     bag = folder / 'bag'
     parameters = {**PARAMETERS, 'publish_rate': RATE}
-    sim = stack.enter_context(live.started('sim_node', parameters, folder))
+    sim = stack.enter_context(node_processes.started('sim_node', parameters, folder))
     to = {'bag': str(bag), 'max_duration_s': 300.0}
-    recorder = stack.enter_context(live.started('recorder_node', to, folder))
+    recorder = stack.enter_context(node_processes.started('recorder_node', to, folder))
     for who in ('pilot', 'listener', 'guests'):
         stack.enter_context(role(who))
     watcher.spin_until(lambda: len(watcher.told) == 2, START, 'both nodes')
@@ -168,7 +168,9 @@ def crowd(stack: ExitStack, domain: int, folder: Path, minutes: float, out: Path
         own.mkdir()
         parameters = {'launch.speed': speed, 'throw_period': PERIOD, 'publish_rate': 50.0}
         place = ('-r', f'__ns:={space}')
-        sims[space] = stack.enter_context(live.started('sim_node', parameters, own, *place))
+        sims[space] = stack.enter_context(
+            node_processes.started('sim_node', parameters, own, *place)
+        )
     watcher.spin_until(lambda: len(watcher.told) == CROWD, START, 'all simulators')
     samples: dict[str, list[Sample]] = {space: [] for space in sims}
     begun = time.monotonic()
@@ -203,7 +205,7 @@ def side_by_side(watcher: Watcher, speeds: dict[str, float]) -> Check:
     """Every landing is the core's to the last bit: what one does must not reach another."""
     count = same = missing = 0
     for space, speed in speeds.items():
-        flight = fly(Launch(speed=speed), Setup(disc=catalogue.load('frisbee')))
+        flight = fly(Launch(speed=speed), Setup(disc=disc_file.load_disc('frisbee')))
         landed = watcher.named(f'{space}landed')
         expected = (flight.time, *flight.position[:2])
         same += sum(landing(one) == expected for one in landed)
@@ -224,7 +226,7 @@ def landing(event: Values) -> tuple[float, ...]:
 def as_computed(landed: Sequence[Values], count: int) -> Check:
     """Every landing is the core's to the last bit: gusts and seed come to it unharmed."""
     wind = Wind(mean=(2.0, -1.0, 0.0), turbulence=GUSTS)
-    setup = Setup(disc=catalogue.load('frisbee'), wind=wind, step=1e-3)
+    setup = Setup(disc=disc_file.load_disc('frisbee'), wind=wind, step=1e-3)
     core = fly_many({'speed': np.full(count, 15.0)}, setup, seeds=np.arange(count))
     told = {int(event['flight']): landing(event) for event in landed}
     same = sum(told.get(n + 1) == (core.time[n], core.x[n], core.y[n]) for n in range(count))

@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from stamps import Stamps
 from std_srvs.srv import Trigger
 
-from disc_sim_ros.nodes import topics
+from disc_sim_ros import topics
 
 Values = dict[str, str]  # of an event or of diagnostics
 

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from disc_sim_ros.analysis.bag_report import STILL, Analysis, document
+from disc_sim_ros.analysis.flight_report import columns
 from disc_sim_ros.analysis.recording import NANOSECONDS, Change
-from disc_sim_ros.analysis.report import columns
 
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#000000')
 _INPUTS = {

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from disc_sim_ros.analysis.kinematics import (
+from disc_sim_ros.analysis.checks import (
     Check,
     Stamps,
     checks,
@@ -17,14 +17,14 @@ from disc_sim_ros.analysis.kinematics import (
     turns_with_spin,
     with_twist,
 )
-from disc_sim_ros.analysis.motion import paper_states
+from disc_sim_ros.analysis.odometry import paper_states
 from disc_sim_ros.analysis.recording import NANOSECONDS, Change, Flight
-from disc_sim_ros.analysis.refly import Reflight, Verdict, compare, fly_again
-from disc_sim_ros.core import axes
-from disc_sim_ros.core.disc import FloatArray
-from disc_sim_ros.core.equations import State
-from disc_sim_ros.core.errors import DiscSimError
-from disc_sim_ros.core.trajectory import Trajectory
+from disc_sim_ros.analysis.resimulate import Reflight, Verdict, compare, fly_again
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.physics.trajectory import Trajectory
 
 _LOSSES = re.compile(r'drop|lost|loss|gap|missed', re.IGNORECASE)
 GUSTS, MEAN, STILL = 'with gusts', 'mean wind, without gusts', 'wind unknown, taken as 0'
@@ -107,7 +107,7 @@ def _mean_wind(flight: Flight, again: Reflight | None) -> tuple[FloatArray, str]
     if again is not None:
         winds[:] = again.setup.wind.mean
     for change in told:
-        winds[stamps >= change.stamp] = axes.turned(change.values)
+        winds[stamps >= change.stamp] = frames.flip_yz(change.values)
     return winds, MEAN if told or again is not None else STILL
 
 
@@ -144,8 +144,8 @@ def document(a: Analysis) -> dict[str, Any]:
     """Return an analysis as values that JSON knows; keys carry units, positions are in `map`."""
     flight, states = a.flight, a.trajectory
     told = flight.release.configuration if flight.release else None
-    position = axes.map_from_paper(states.position) + 0.0
-    start = axes.map_from_paper(a.release[:3]) + 0.0
+    position = frames.map_from_paper(states.position) + 0.0
+    start = frames.map_from_paper(a.release[:3]) + 0.0
     end = position[-1]
     if a.landing is not None:
         end = np.array([a.landing['landing_x_m'], a.landing['landing_y_m'], 0.0])
@@ -232,8 +232,8 @@ def _setup_document(told: Mapping[str, Any]) -> dict[str, Any]:
 def _launch_document(a: Analysis) -> dict[str, Any]:
     s = a.release
     e = (s.e0, s.e1, s.e2, s.e3)
-    roll, pitch, yaw = np.degrees(axes.euler_from_quaternion(e)).tolist()
-    u, v, w = axes.rotation_matrix(e).T @ np.array(s[3:6])
+    roll, pitch, yaw = np.degrees(frames.euler_from_quaternion(e)).tolist()
+    u, v, w = frames.rotation_matrix(e).T @ np.array(s[3:6])
     return {
         'speed_m_s': math.hypot(*s[3:6]),
         'roll_deg': roll + 0.0,
@@ -245,7 +245,7 @@ def _launch_document(a: Analysis) -> dict[str, Any]:
         'spin_rad_s': s.r,
         'roll_rate_rad_s': s.p,
         'pitch_rate_rad_s': s.q,
-        'position_m': (axes.map_from_paper(s[:3]) + 0.0).tolist(),
+        'position_m': (frames.map_from_paper(s[:3]) + 0.0).tolist(),
         'height_m': 0.0 - s.Z,
         'frame_spins': turns_with_spin(a.flight.motion),
     }
@@ -255,7 +255,7 @@ def _heading(a: Analysis) -> float:
     """Return where the launch aimed, left of +x [rad]: the disc, or else the velocity."""
     s = a.release
     if a.again is not None:
-        return -float(axes.euler_from_quaternion((s.e0, s.e1, s.e2, s.e3))[2])
+        return -float(frames.euler_from_quaternion((s.e0, s.e1, s.e2, s.e3))[2])
     return math.atan2(-s.VY, s.VX)
 
 

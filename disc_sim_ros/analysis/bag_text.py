@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 from typing import Any
 
 from disc_sim_ros.analysis.bag_report import Analysis, changes_of, document
-from disc_sim_ros.analysis.kinematics import Stamps
+from disc_sim_ros.analysis.checks import Stamps
+from disc_sim_ros.analysis.flight_report import sideways
 from disc_sim_ros.analysis.recording import NANOSECONDS, Flight
-from disc_sim_ros.analysis.report import sideways
 
 
 def summary(a: Analysis) -> str:

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from disc_sim_ros.analysis.motion import Motion
+from disc_sim_ros.analysis.odometry import Motion
 from disc_sim_ros.analysis.recording import NANOSECONDS, Disc, Event, Flight
-from disc_sim_ros.core.disc import FloatArray
+from disc_sim_ros.arrays import FloatArray
 
 GAP = 0.5  # s without a message, or ten times the usual distance of messages where that is more
 JUMP = 1.0  # m between two messages beyond what the velocity explains

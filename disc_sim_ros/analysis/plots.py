@@ -6,8 +6,8 @@ import warnings
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from disc_sim_ros.analysis.report import columns
-from disc_sim_ros.core.flight import Flight
+from disc_sim_ros.analysis.flight_report import columns
+from disc_sim_ros.physics.flight import Flight
 
 BLUE, ORANGE = '#0072b2', '#d55e00'  # Okabe and Ito: safe for colour-blind readers
 _HISTORIES = (

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from disc_sim_ros.analysis.motion import ODOMETRY, POSE, Motion, message_numbers, motions
-from disc_sim_ros.bags.errors import BagError
+from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, Motion, message_numbers, motions
+from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.bags.reader import Bag, Message
-from disc_sim_ros.core.disc import FloatArray
-from disc_sim_ros.core.equations import State
+from disc_sim_ros.errors import BagError
+from disc_sim_ros.physics.kernels.equations import State
 
 NANOSECONDS = 1_000_000_000
 APPLIED = ('applied_moment', 'applied_coefficients', 'applied_wind')

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from disc_sim_ros.bags import metadata
-from disc_sim_ros.bags.mcap_file import Definition, McapFile
+from disc_sim_ros.bags.mcap_writer import Definition, McapFile
 from disc_sim_ros.bags.metadata import BagMetadata, FileInfo, TopicInfo
 from disc_sim_ros.bags.topic import Topic
 

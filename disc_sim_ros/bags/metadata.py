@@ -8,8 +8,8 @@ from typing import Any
 import yaml
 
 from disc_sim_ros.bags import qos
-from disc_sim_ros.bags.errors import BagError
 from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.errors import BagError
 
 FILE_NAME = 'metadata.yaml'
 RECORD = 'rosbag2'  # the MCAP metadata record that holds the same text

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from disc_sim_ros.bags.errors import BagError
+from disc_sim_ros.errors import BagError
 
 # The C one is many times faster; not every build of PyYAML has it.
 LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)

@@ -15,21 +15,20 @@ from mcap.records import Attachment, Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from disc_sim_ros.bags import metadata, qos, schemas
-from disc_sim_ros.bags.contents import (
+from disc_sim_ros.bags.mcap_reader import indexed
+from disc_sim_ros.bags.mcap_records import (
+    Chunk,
     Contents,
     Loss,
-    Piece,
     attachment_at,
+    chunk_bytes,
     messages,
-    piece_data,
 )
-from disc_sim_ros.bags.disk import reason
-from disc_sim_ros.bags.errors import BagError, DamageError
-from disc_sim_ros.bags.index import indexed
+from disc_sim_ros.bags.mcap_recovery import scanned
 from disc_sim_ros.bags.metadata import BagMetadata, TopicInfo
-from disc_sim_ros.bags.scan import scanned
 from disc_sim_ros.bags.topic import Topic
-from disc_sim_ros.core.errors import brief
+from disc_sim_ros.errors import BagError, DamageError, brief
+from disc_sim_ros.files import reason
 
 _NUMBER = re.compile(r'_(\d+)\.mcap$')
 _OTHERS = (  # how files that are no MCAP begin, and what to do
@@ -326,9 +325,9 @@ def _names(contents: Contents, wanted: frozenset[str] | None) -> dict[int, str]:
     }
 
 
-def _messages(path: Path, file: BinaryIO, piece: Piece, ids: frozenset[int]) -> list[Any]:
+def _messages(path: Path, file: BinaryIO, piece: Chunk, ids: frozenset[int]) -> list[Any]:
     try:
-        data = piece_data(file, piece)
+        data = chunk_bytes(file, piece)
         return list(messages(data, ids))
     except DamageError as error:
         raise _damage(path, piece.offset, error) from None

@@ -10,15 +10,14 @@ from typing import Any
 from mcap.records import Channel
 
 from disc_sim_ros.bags import metadata
-from disc_sim_ros.bags.contents import Contents, Loss, attachment_at, messages, piece_data
-from disc_sim_ros.bags.disk import reason, sync_folder
-from disc_sim_ros.bags.errors import BagError, DamageError, WriteError
+from disc_sim_ros.bags.mcap_records import Contents, Loss, attachment_at, chunk_bytes, messages
+from disc_sim_ros.bags.mcap_recovery import scanned
 from disc_sim_ros.bags.metadata import BagMetadata
 from disc_sim_ros.bags.reader import contents_of, mcap_files, told_by, topic_of
-from disc_sim_ros.bags.scan import scanned
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros.errors import BagError, ConfigError, DamageError, WriteError
+from disc_sim_ros.files import reason, sync_folder
 
 _FLUSH_PERIOD = 30.0  # s: what is made can be made again
 
@@ -195,7 +194,7 @@ def _copy(
             with contents.path.open('rb') as file:
                 for piece in contents.pieces:
                     try:
-                        data = piece_data(file, piece)
+                        data = chunk_bytes(file, piece)
                     except DamageError as error:  # it was readable a moment ago
                         why = f'{error}, which it was not when it was read first'
                         losses.append(Loss(contents.path, piece.offset, piece.length, why))

@@ -9,10 +9,10 @@ import time
 from types import TracebackType
 from typing import Self
 
-from disc_sim_ros.bags import disk, metadata
-from disc_sim_ros.bags.errors import BagError, WriteError
+from disc_sim_ros import files, validation
+from disc_sim_ros.bags import metadata
 from disc_sim_ros.bags.ledger import Ledger
-from disc_sim_ros.bags.mcap_file import (
+from disc_sim_ros.bags.mcap_writer import (
     CHUNK_SIZE,
     COMPRESSIONS,
     Definition,
@@ -20,7 +20,7 @@ from disc_sim_ros.bags.mcap_file import (
     new_attachment,
 )
 from disc_sim_ros.bags.topic import Topic
-from disc_sim_ros.core import check
+from disc_sim_ros.errors import BagError, WriteError
 
 _MOST_CHANNELS = 65535  # ids are of 16 bits
 _MARGIN = 64 * 1024  # bytes of room kept for the end beside what is counted
@@ -61,16 +61,16 @@ class BagWriter:
             ConfigError: A value is not allowed, the folder exists or cannot be made.
             BagError: The system refuses to write in it.
         """
-        check.choice('compression', compression, COMPRESSIONS)
-        self._period = check.number('flush_period', flush_period, 1e-3, 3600.0, unit='s')
+        validation.choice('compression', compression, COMPRESSIONS)
+        self._period = validation.number('flush_period', flush_period, 1e-3, 3600.0, unit='s')
         self._max_size: float = math.inf
         if max_size is not None:
-            self._max_size = check.whole_number('max_size', max_size, 1024, 2**62)
+            self._max_size = validation.whole_number('max_size', max_size, 1024, 2**62)
         self._max_duration: float = math.inf
         if max_duration is not None:
-            seconds = check.number('max_duration', max_duration, 1e-3, 1e9, unit='s')
+            seconds = validation.number('max_duration', max_duration, 1e-3, 1e9, unit='s')
             self._max_duration = round(seconds * 1e9)
-        self.folder = disk.new_folder(Path(folder))
+        self.folder = files.new_folder(Path(folder))
         self.lost = 0  # messages that a full disk cost
         self.flushed = 0  # messages that the disk has
         self._compression = compression
@@ -81,7 +81,7 @@ class BagWriter:
         self._stale = True  # metadata.yaml does not say all
         self._synced = 0  # bytes of the open file that the disk has
         self._chunk_size = min(CHUNK_SIZE, max(4096, self._max_size / 8))
-        self._reserve = disk.Reserve(self.folder)
+        self._reserve = files.Reserve(self.folder)
         self._turn_at = 0.0  # log time at which another file begins [ns]
         self._due = 0.0  # when to flush, by the monotonic clock [s]
         self._file: McapFile = None  # type: ignore[assignment]  # until the next line but one
@@ -93,7 +93,7 @@ class BagWriter:
             if self._file is not None:
                 self._file.close()
             shutil.rmtree(self.folder, ignore_errors=True)
-            why = disk.reason(error)
+            why = files.reason(error)
             raise WriteError(f'{self.folder}: no bag can be written there ({why})', why) from None
 
     def add(self, topic: Topic) -> int:
@@ -332,7 +332,7 @@ class BagWriter:
         if self._file.size >= self._max_size:
             self._turn_at = 0.0
         if self._stale:
-            disk.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))
+            files.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))
             self._stale = False
 
     def _hold_reserve(self) -> None:
@@ -357,7 +357,7 @@ class BagWriter:
         return self._failure
 
     def _reason(self, error: OSError) -> str:
-        return disk.reason(error) if self.folder.is_dir() else 'the folder has been removed'
+        return files.reason(error) if self.folder.is_dir() else 'the folder has been removed'
 
     def _open_file(self) -> None:
         number = len(self._ledger.files) + (self._file is not None)
@@ -370,7 +370,7 @@ class BagWriter:
         self._turn_at = 0.0
         self._synced = 0
         file.add_metadata(metadata.RECORD, {metadata.KEY: self._ledger.text(self._file)})
-        disk.sync_folder(self.folder)
+        files.sync_folder(self.folder)
         self._stale = True
 
     def _finish_file(self) -> None:
@@ -383,4 +383,4 @@ class BagWriter:
     def _end_in_reserve(self) -> None:
         self._reserve.release()
         self._finish_file()
-        disk.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))
+        files.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))

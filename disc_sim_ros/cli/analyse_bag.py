@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -88,8 +88,8 @@ def _run(chosen: argparse.Namespace) -> int:
         output.check_writable('--plot', plot)
     # What takes a second to import is imported when the flags are known to be right.
     from disc_sim_ros.analysis import bag_report, flights, recording  # noqa: PLC0415
-    from disc_sim_ros.bags.errors import BagError  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
+    from disc_sim_ros.errors import BagError  # noqa: PLC0415
 
     try:
         bag = open_bag(chosen.bag)

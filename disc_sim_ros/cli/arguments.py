@@ -5,8 +5,8 @@ from collections.abc import Callable
 import re
 from typing import Any, NoReturn
 
-from disc_sim_ros.core import check
-from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros import validation
+from disc_sim_ros.errors import ConfigError
 
 # argparse takes only -1 and -1.5 for numbers, and would read -1e-3 or -inf as a flag.
 _NEGATIVE = re.compile(r'^-(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?$|^-(inf|infinity|nan)$', re.I)
@@ -43,7 +43,7 @@ def number(lowest: float, highest: float, unit: str) -> Callable[[str], float]:
         except ValueError:
             value = text
         try:
-            return check.number('', value, lowest, highest, unit=unit)
+            return validation.number('', value, lowest, highest, unit=unit)
         except ConfigError as error:
             raise argparse.ArgumentTypeError(str(error).removeprefix(': ')) from None
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Self
 
 import disc_sim_ros
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output, throw_flags
+from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.core import flight
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics import flight
 
 if TYPE_CHECKING:
-    from disc_sim_ros.nodes.live import Seen
+    from disc_sim_ros.ros.client import Seen
 
 DIFFERENT = 3  # exit code, as of analyse_bag
 HELD = 3600.0  # s that --control acts without being renewed: the whole flight
@@ -32,17 +32,17 @@ def parser() -> Parser:
         prog='demo',
         description='Start sim_node and recorder_node in a ROS domain of their own, throw one '
         'disc in real time, and leave a bag, a plot and a summary. Angles and control inputs have '
-        f'the signs of {throw_flags.PAPER}. Needs ROS 2 Jazzy.',
+        f'the signs of {flags.PAPER}. Needs ROS 2 Jazzy.',
         epilog='Exit code 0; 1: something failed; 2: bad input; 3: the flight computed again from '
         'the bag differs from the recorded one.',
     )
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    throw_flags.add_disc(p)
-    throw_flags.add_launch(p)
-    throw_flags.add_air(p, 'air and controls')
+    flags.add_disc(p)
+    flags.add_launch(p)
+    flags.add_air(p, 'air and controls')
     kept = p.add_argument_group('what is kept')
     text = 'longest time to wait for the landing'
-    throw_flags.add_number(kept, '--seconds', 60.0, 0.1, flight.LONGEST, 's', 'S', text)
+    flags.add_number(kept, '--seconds', 60.0, 0.1, flight.LONGEST, 's', 'S', text)
     kept.add_argument(
         '--bag',
         default=argparse.SUPPRESS,
@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return _run(chosen)
     except ConfigError as error:
-        thing = throw_flags.flag_of(error, chosen)
+        thing = flags.flag_of(error, chosen)
         p.error(str(ConfigError({'bag': '--bag'}.get(thing, thing), error.value, error.allowed)))
     except DiscSimError as error:
         sys.stderr.write(f'demo: error: {error}\n')
@@ -72,17 +72,17 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(chosen: argparse.Namespace) -> int:
-    release, setup = throw_flags.thrown(chosen)
+    release, setup = flags.thrown(chosen)
     flight.check_flight(release, setup, chosen.seconds, ground=True, sample_rate=0.0)
     try:
-        from disc_sim_ros.nodes import live  # noqa: F401, PLC0415 - to see that ROS is there
-        from disc_sim_ros.nodes.sim_config import configuration  # noqa: PLC0415
+        from disc_sim_ros.ros import client, processes  # noqa: F401, PLC0415 - to see that ROS is there
+        from disc_sim_ros.ros.sim.config import configuration  # noqa: PLC0415
     except ImportError as error:
         raise DiscSimError(
             f'it needs rclpy and the message packages of ROS 2 Jazzy ({error}); '
             '`fly --plot FILE.png` throws without them'
         ) from None
-    parameters = throw_flags.parameters(chosen, release, setup)
+    parameters = flags.parameters(chosen, release, setup)
     configuration(parameters)  # what the simulator would refuse is refused here
     bag, plot = _places(getattr(chosen, 'bag', None))
     try:
@@ -165,22 +165,22 @@ def _record(
     signals: _Signals,
 ) -> None:
     """Fly and record one throw."""
-    from disc_sim_ros.nodes import live  # noqa: PLC0415
+    from disc_sim_ros.ros import client, processes  # noqa: PLC0415
 
-    control = throw_flags.control_of(chosen)
+    control = flags.control_of(chosen)
     parameters |= {'auto_throw': False, 'command_timeout': HELD}
     progress = _Progress()
     with ExitStack() as stack:
-        domain = stack.enter_context(live.own_domain())
+        domain = stack.enter_context(processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='demo_')))
         progress.line(f'starting sim_node and recorder_node in ROS domain {domain}')
         if not flight.is_ready():
             progress.line('compiling the equations of motion, once on this machine, about 10 s')
         with signals.held():
-            sim = stack.enter_context(live.started('sim_node', parameters, folder))
+            sim = stack.enter_context(processes.started('sim_node', parameters, folder))
             to = {'bag': str(bag.absolute()), 'start_paused': True}
-            recorder = stack.enter_context(live.started('recorder_node', to, folder))
-        watcher = live.Watcher(domain, (sim, recorder), signals.held)
+            recorder = stack.enter_context(processes.started('recorder_node', to, folder))
+        watcher = client.Watcher(domain, (sim, recorder), signals.held)
         stack.callback(watcher.close)
         watcher.wait_until_recorded(bag)
         if any((control.C_L, control.C_M, control.C_N)):

@@ -10,11 +10,11 @@ import sys
 import time
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output, throw_flags
+from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser, number
-from disc_sim_ros.core import flight
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
-from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics import flight
+from disc_sim_ros.physics.launch import Launch
 
 DEFAULT_RATE = 100.0  # Hz, of files without --samples
 PLOTS = ('png', 'svg', 'pdf')
@@ -31,15 +31,15 @@ def parser() -> Parser:
     p = Parser(
         prog='fly',
         description='Fly one disc from its release to the ground, without ROS. Angles and control '
-        f'inputs have the signs of {throw_flags.PAPER}; positions, velocities and wind are in map '
+        f'inputs have the signs of {flags.PAPER}; positions, velocities and wind are in map '
         'axes: x forward, y left, z up.',
     )
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    throw_flags.add_disc(p)
-    throw_flags.add_launch(p)
-    around = throw_flags.add_air(p, 'air, controls and end')
+    flags.add_disc(p)
+    flags.add_launch(p)
+    around = flags.add_air(p, 'air, controls and end')
     text = 'longest time of flight'
-    throw_flags.add_number(around, '--duration', 60.0, 1e-6, flight.LONGEST, 's', 'S', text)
+    flags.add_number(around, '--duration', 60.0, 1e-6, flight.LONGEST, 's', 'S', text)
     around.add_argument(
         '--no-ground', action='store_true', help='fly on below z = 0, for the whole duration'
     )
@@ -51,7 +51,7 @@ def parser() -> Parser:
         default=argparse.SUPPRESS,
         metavar='HZ',
         help=f'samples per second, evenly timed; from 0.001 to 10000 (default: {DEFAULT_RATE:g} '
-        f'in files, {throw_flags.PUBLISH_RATE:g} in bags, else none)',
+        f'in files, {flags.PUBLISH_RATE:g} in bags, else none)',
     )
     shape = shown.add_mutually_exclusive_group()
     shape.add_argument('--json', action='store_true', help='print one JSON document instead')
@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         _run(chosen)
     except ConfigError as error:
-        thing = throw_flags.flag_of(error, chosen)
+        thing = flags.flag_of(error, chosen)
         thing = _FLAG_OF.get(thing, thing)
         allowed = error.allowed + _HINTS.get(thing, '')
         p.error(str(ConfigError(thing, error.value, allowed)))
@@ -104,21 +104,21 @@ def _run(chosen: argparse.Namespace) -> None:
         output.check_writable('--plot', plot)
     in_file = csv is not None or plot is not None
     rate = getattr(chosen, 'samples', DEFAULT_RATE if in_file else 0.0)
-    release, setup = throw_flags.thrown(chosen)
+    release, setup = flags.thrown(chosen)
     write = None if bag is None else _bag_writer(chosen, bag, release, setup)
 
     found = _fly(chosen, release, setup, 0.0 if bag is not None else rate)
     # Reports and plots are imported where they are needed: matplotlib takes half a second.
-    from disc_sim_ros.analysis import report  # noqa: PLC0415
+    from disc_sim_ros.analysis import flight_report  # noqa: PLC0415
 
     if chosen.json:
-        document = report.document(found)
+        document = flight_report.document(found)
         document['launch']['disc'] = chosen.disc  # of a file its path, which finds it again
         output.show(json.dumps(document, allow_nan=False))
         return
-    lines = [report.summary(found)]
+    lines = [flight_report.summary(found)]
     if csv is not None:
-        output.write_whole('--csv', csv, report.csv_text(found.trajectory).encode())
+        output.write_whole('--csv', csv, flight_report.csv_text(found.trajectory).encode())
         lines.append(f'  wrote   {csv}, {len(found.trajectory)} rows')
     elif plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415
@@ -129,7 +129,7 @@ def _run(chosen: argparse.Namespace) -> None:
     elif write is not None:
         lines.append(f'  wrote   {write()}')
     elif rate > 0.0:
-        lines.append(report.samples_text(found.trajectory))
+        lines.append(flight_report.samples_text(found.trajectory))
     output.show('\n'.join(lines))
 
 
@@ -147,7 +147,7 @@ def _fly(
         return flight.fly(
             release,
             setup,
-            control=throw_flags.control_of(chosen),
+            control=flags.control_of(chosen),
             duration=chosen.duration,
             ground=ground,
             sample_rate=rate,
@@ -163,25 +163,25 @@ def _bag_writer(
         ConfigError: The bag cannot be written, without the flight being flown.
     """
     try:  # half a second, and not everywhere
-        from disc_sim_ros.nodes import flight_bag  # noqa: PLC0415
-        from disc_sim_ros.nodes.sim_config import configuration  # noqa: PLC0415
+        from disc_sim_ros.ros.sim import offline_bag  # noqa: PLC0415
+        from disc_sim_ros.ros.sim.config import configuration  # noqa: PLC0415
     except ImportError as error:
         allowed = f'it needs rclpy and the message packages of ROS 2 Jazzy ({error})'
         raise ConfigError('--bag', bag, allowed) from None
-    flight_bag.check_new(bag)
+    offline_bag.check_new(bag)
     flight.check_flight(
         release, setup, chosen.duration, ground=not chosen.no_ground, sample_rate=0.0
     )
-    values = throw_flags.parameters(chosen, release, setup)
+    values = flags.parameters(chosen, release, setup)
     values['ground'] = not chosen.no_ground
     if hasattr(chosen, 'samples'):
         values['publish_rate'] = chosen.samples
     config = replace(configuration(values), setup=setup)
 
     def write() -> str:
-        start = flight_bag.epoch(time.time_ns())
-        control = throw_flags.control_of(chosen)
-        written = flight_bag.write_flight(bag, config, control, chosen.duration, start)
+        start = offline_bag.epoch(time.time_ns())
+        control = flags.control_of(chosen)
+        written = offline_bag.write_flight(bag, config, control, chosen.duration, start)
         total = sum(written.counts.values())
         topics = sum(count > 0 for count in written.counts.values())
         return f'{bag}: {total} messages of {topics} topics, {written.size / 1e6:.1f} MB'

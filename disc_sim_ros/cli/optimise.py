@@ -11,13 +11,14 @@ import sys
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import ensemble_flags, output, throw_flags
+from disc_sim_ros.cli import flags as throw_flags
+from disc_sim_ros.cli import output, study_flags
 from disc_sim_ros.cli.arguments import Parser, number
-from disc_sim_ros.cli.ensemble_flags import listed
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.cli.study_flags import listed
+from disc_sim_ros.errors import ConfigError, DiscSimError
 
 if TYPE_CHECKING:
-    from disc_sim_ros.analysis.ensembles.optimise import Problem
+    from disc_sim_ros.studies.optimise import Problem
 
 PLOTS = ('png', 'svg', 'pdf')
 DEFAULT_COUNT = 256  # throws of each launch under scatter
@@ -43,11 +44,11 @@ def parser() -> Parser:
         'A flag of `fly` that is given holds; the others of the limits are free. Angles have the '
         f'signs of {throw_flags.PAPER}; positions and wind are in map axes: x forward, y left, z '
         'up.',
-        epilog=f'{_defaults_text()} {ensemble_flags.names_text()} Exit code 0; 1: a failed '
+        epilog=f'{_defaults_text()} {study_flags.names_text()} Exit code 0; 1: a failed '
         'search; 2: bad input.',
     )
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    ensemble_flags.add_throw(p, ground=False)
+    study_flags.add_throw(p, ground=False)
     what = p.add_argument_group('what is best')
     what.add_argument(
         '--for', choices=('range', 'time', 'accuracy'), default='range', dest='goal', help='goal'
@@ -61,9 +62,9 @@ def parser() -> Parser:
         help='for accuracy: where to land; from -10000 to 10000 m each',
     )
     text = 'free quantity and its range'
-    ensemble_flags.add_list(what, '--limit', 'NAME=LOW:HIGH', text)
+    study_flags.add_list(what, '--limit', 'NAME=LOW:HIGH', text)
     text = 'normal scatter of the throws around each launch'
-    ensemble_flags.add_list(what, '--scatter', 'NAME=SD', text)
+    study_flags.add_list(what, '--scatter', 'NAME=SD', text)
     what.add_argument(
         '--percentile',
         type=number(1.0, 99.0, '%'),
@@ -73,12 +74,12 @@ def parser() -> Parser:
     )
     what.add_argument(
         '--count',
-        type=ensemble_flags.whole(2, 100_000),
+        type=study_flags.whole(2, 100_000),
         default=DEFAULT_COUNT,
         metavar='N',
         help='throws of each launch under scatter or in gusts',
     )
-    ensemble_flags.add_seed(what, 'of the search, the scatter and the gusts')
+    study_flags.add_seed(what, 'of the search, the scatter and the gusts')
     what.add_argument('--json', action='store_true', help='print one JSON document instead')
     what.add_argument(
         '--plot',
@@ -116,38 +117,38 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
     Raises:
         ConfigError: They contradict each other, or are out of range.
     """
-    from disc_sim_ros.analysis.ensembles import human, optimise  # noqa: PLC0415 - scipy
-    from disc_sim_ros.analysis.ensembles.flying import good_step  # noqa: PLC0415
-    from disc_sim_ros.analysis.ensembles.question import Question  # noqa: PLC0415
+    from disc_sim_ros.studies import optimise  # noqa: PLC0415 - scipy
+    from disc_sim_ros.studies.flying import good_step  # noqa: PLC0415
+    from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
     flags = {word.partition('=')[0] for word in words}
     given = {name for name, flag in throw_flags.FLAG_OF.items() if flag in flags}
     if '--advance-ratio' in flags:
         given.add('spin')
-    limits = {n: span for n, span in human.LIMITS.items() if n not in given}
+    limits = {n: span for n, span in optimise.HUMAN_LIMITS.items() if n not in given}
     target = None
     if hasattr(chosen, 'target'):
         target = (chosen.target[0], chosen.target[1])
         if 'yaw' not in given:
             bearing = -math.degrees(math.atan2(target[1], target[0]))
             limits['yaw'] = (bearing - 45.0, bearing + 45.0)
-    for name, span in ensemble_flags.ranges('--limit', listed(chosen, 'limit')).items():
+    for name, span in study_flags.ranges('--limit', listed(chosen, 'limit')).items():
         if name in given:
             flag = throw_flags.FLAG_OF[name]
             raise ConfigError('--limit', name, f'{flag} fixes it; give one of the two')
         limits[name] = span
     if 'advance_ratio' in limits:
         limits.pop('spin', None)
-    scatter = ensemble_flags.laws([], [], listed(chosen, 'scatter'))
+    scatter = study_flags.laws([], [], listed(chosen, 'scatter'))
     if chosen.goal == optimise.ACCURACY and not scatter:
-        scatter = ensemble_flags.laws(
-            [], [], [f'{name}={sd}' for name, sd in human.SCATTER.items()]
+        scatter = study_flags.laws(
+            [], [], [f'{name}={sd}' for name, sd in optimise.HUMAN_SCATTER.items()]
         )
     if hasattr(chosen, 'advance_ratio') or 'advance_ratio' in limits:
         scatter.pop('spin', None)
-    release, setup, ratio = ensemble_flags.thrown(chosen)
+    release, setup, ratio = study_flags.thrown(chosen)
     gusts = setup.wind.turbulence > 0.0
-    question = Question(
+    question = Study(
         setup=setup,
         launch=release,
         control=throw_flags.control_of(chosen),
@@ -179,31 +180,33 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> None:
             raise ConfigError('--plot', plot, 'the name must end in .png, .svg or .pdf')
         output.check_writable('--plot', plot)
     posed = problem(chosen, words)
-    from disc_sim_ros.analysis.ensembles import optimise, optimise_texts  # noqa: PLC0415
+    from disc_sim_ros.studies import optimise, optimise_report  # noqa: PLC0415
 
-    ensemble_flags.note_compilation('optimise', posed.question.setup)
+    study_flags.note_compilation('optimise', posed.question.setup)
     found = optimise.optimise(posed, seed=chosen.seed)
-    again = optimise_texts.command(found, chosen.disc)
+    again = optimise_report.command(found, chosen.disc)
     if plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415
-        from disc_sim_ros.analysis.ensembles.optimise_plots import figure  # noqa: PLC0415
+        from disc_sim_ros.studies.optimise_plots import figure  # noqa: PLC0415
 
         picture = plots.image(figure(found), ending)
         output.write_whole('--plot', plot, picture)
     if chosen.json:
-        output.show(json.dumps(optimise_texts.optimum_document(found, again), allow_nan=False))
+        output.show(json.dumps(optimise_report.optimum_document(found, again), allow_nan=False))
         return
-    lines = [optimise_texts.text(found, again)]
+    lines = [optimise_report.text(found, again)]
     if plot is not None:
         lines.append(f'  wrote    {plot}')
     output.show('\n'.join(lines))
 
 
 def _defaults_text() -> str:
-    from disc_sim_ros.analysis.ensembles import human  # noqa: PLC0415
+    from disc_sim_ros.studies import optimise  # noqa: PLC0415
 
-    free = ', '.join(f'{n} {low:g} to {high:g}' for n, (low, high) in human.LIMITS.items())
-    spread = ', '.join(f'{name} {sd:g}' for name, sd in human.SCATTER.items())
+    free = ', '.join(
+        f'{n} {low:g} to {high:g}' for n, (low, high) in optimise.HUMAN_LIMITS.items()
+    )
+    spread = ', '.join(f'{name} {sd:g}' for name, sd in optimise.HUMAN_SCATTER.items())
     return (
         f'Without --limit these are free: {free}, and for accuracy the yaw within 45 degrees of '
         f'the target. Accuracy without --scatter takes the sd {spread}. Both are choices for a '

@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError
 
 
 def check_writable(flag: str, name: str) -> None:

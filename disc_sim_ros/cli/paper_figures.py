@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.core import flight
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics import flight
 
 if TYPE_CHECKING:
-    from disc_sim_ros.experiments.run import Done
+    from disc_sim_ros.paper.run import Done
 
 FORMATS = ('png', 'svg')
 PARTS = ('3', '4', '5', '6', '7', '8', '9', '10', '11', '12', 'models', 'roll_rate', 'statements')
@@ -87,7 +87,7 @@ def _run(chosen: argparse.Namespace) -> None:
     started = time.perf_counter()
     folder = made(chosen.out)
     # Not before the arguments are known to be good: matplotlib and scipy take a second.
-    from disc_sim_ros.experiments import run  # noqa: PLC0415
+    from disc_sim_ros.paper import run  # noqa: PLC0415
 
     if not flight.is_ready():
         sys.stderr.write(
@@ -129,8 +129,8 @@ def made(name: str) -> Path:
 
 def _parts(chosen: argparse.Namespace, folder: Path) -> Iterator['Done']:
     """Yield the parts as they get done."""
-    from disc_sim_ros.analysis.ensembles import executors  # noqa: PLC0415
-    from disc_sim_ros.experiments import run  # noqa: PLC0415
+    from disc_sim_ros.paper import run  # noqa: PLC0415
+    from disc_sim_ros.studies import executors  # noqa: PLC0415
 
     if chosen.jobs == 1 or len(chosen.only) == 1:
         for key in chosen.only:
@@ -151,10 +151,10 @@ def _parts(chosen: argparse.Namespace, folder: Path) -> Iterator['Done']:
 
 
 def _compile() -> None:
-    from disc_sim_ros.core import catalogue  # noqa: PLC0415
-    from disc_sim_ros.core.launch import Launch  # noqa: PLC0415
+    from disc_sim_ros.physics import disc_file  # noqa: PLC0415
+    from disc_sim_ros.physics.launch import Launch  # noqa: PLC0415
 
-    setup = flight.Setup(disc=catalogue.load('frisbee'))
+    setup = flight.Setup(disc=disc_file.load_disc('frisbee'))
     flight.fly(Launch(), setup, duration=0.01, ground=False)
 
 

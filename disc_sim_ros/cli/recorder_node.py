@@ -1,4 +1,4 @@
-"""`recorder_node`: the node of `disc_sim_ros.nodes.recorder_node`."""
+"""`recorder_node`: the node of `disc_sim_ros.ros.recorder.node`."""
 
 import os
 import signal
@@ -23,6 +23,6 @@ def main() -> int:
     if {'-h', '--help'} & set(sys.argv[1:]):
         sys.stdout.write(USAGE)
         return 0
-    from disc_sim_ros.nodes import recorder_node  # noqa: PLC0415 - takes a second
+    from disc_sim_ros.ros.recorder import node  # noqa: PLC0415 - takes a second
 
-    return recorder_node.main()
+    return node.main()

@@ -9,7 +9,7 @@ import sys
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError
 
 
 def parser() -> Parser:

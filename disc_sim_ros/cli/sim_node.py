@@ -1,4 +1,4 @@
-"""`sim_node`: the node of `disc_sim_ros.nodes.sim_node`."""
+"""`sim_node`: the node of `disc_sim_ros.ros.sim.node`."""
 
 import os
 import signal
@@ -22,6 +22,6 @@ def main() -> int:
     if {'-h', '--help'} & set(sys.argv[1:]):
         sys.stdout.write(USAGE)
         return 0
-    from disc_sim_ros.nodes import sim_node  # noqa: PLC0415 - takes a second
+    from disc_sim_ros.ros.sim import node  # noqa: PLC0415 - takes a second
 
-    return sim_node.main()
+    return node.main()

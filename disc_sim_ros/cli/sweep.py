@@ -11,14 +11,14 @@ import time
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import ensemble_flags, output, throw_flags
+from disc_sim_ros.cli import flags, output, study_flags
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.cli.ensemble_flags import listed
 from disc_sim_ros.cli.progress import ProgressBar, duration
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.cli.study_flags import listed
+from disc_sim_ros.errors import ConfigError, DiscSimError
 
 if TYPE_CHECKING:
-    from disc_sim_ros.analysis.ensembles.question import Question
+    from disc_sim_ros.studies.study import Study
 
 PLOTS = ('png', 'svg', 'pdf')
 DEFAULT_COUNT = 1000  # samples, where something scatters
@@ -46,24 +46,24 @@ def parser() -> Parser:
         description='Fly grids and random ensembles into one Parquet or CSV file, with a summary. '
         'The flags of `fly` hold for every flight; --vary, --normal, --uniform and --scatter '
         'change some of them from flight to flight. Angles and control inputs have the signs of '
-        f'{throw_flags.PAPER}; positions and wind are in map axes: x forward, y left, z up.',
-        epilog=f'{ensemble_flags.names_text()} Exit code 0; 1: a failed run; 2: bad input; 130: '
+        f'{flags.PAPER}; positions and wind are in map axes: x forward, y left, z up.',
+        epilog=f'{study_flags.names_text()} Exit code 0; 1: a failed run; 2: bad input; 130: '
         'Ctrl-C. Finished flights are kept in FILE.parts, and --resume goes on.',
     )
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    ensemble_flags.add_throw(p)
+    study_flags.add_throw(p)
     what = p.add_argument_group('what differs from flight to flight')
     text = 'values of a grid; several span it'
-    ensemble_flags.add_list(what, '--vary', 'NAME=START:STOP:STEP|START:STOP/N|A,B,C', text)
-    ensemble_flags.add_list(what, '--normal', 'NAME=MEAN,SD', 'normal scatter')
-    ensemble_flags.add_list(what, '--uniform', 'NAME=LOW,HIGH', 'uniform scatter')
+    study_flags.add_list(what, '--vary', 'NAME=START:STOP:STEP|START:STOP/N|A,B,C', text)
+    study_flags.add_list(what, '--normal', 'NAME=MEAN,SD', 'normal scatter')
+    study_flags.add_list(what, '--uniform', 'NAME=LOW,HIGH', 'uniform scatter')
     text = 'normal scatter around the value of the grid or of the flag'
-    ensemble_flags.add_list(what, '--scatter', 'NAME=SD', text)
+    study_flags.add_list(what, '--scatter', 'NAME=SD', text)
     text = 'correlation of two that scatter, from -1 to 1'
-    ensemble_flags.add_list(what, '--correlation', 'A,B=R', text)
+    study_flags.add_list(what, '--correlation', 'A,B=R', text)
     what.add_argument(
         '--count',
-        type=ensemble_flags.whole(1, 2**30),
+        type=study_flags.whole(1, 2**30),
         default=argparse.SUPPRESS,
         metavar='N',
         help=f'samples of the scatter, at each point of a grid (default: {DEFAULT_COUNT}, without '
@@ -74,7 +74,7 @@ def parser() -> Parser:
         action='store_true',
         help='draw quasi-random samples, which fill the space evenly; best with a --count of 2^k',
     )
-    ensemble_flags.add_seed(what, 'of the scatter and of the gusts')
+    study_flags.add_seed(what, 'of the scatter and of the gusts')
     what.add_argument(
         '--gust-seeds',
         choices=('each', 'same'),
@@ -82,10 +82,10 @@ def parser() -> Parser:
         help='gusts of sample k from seed N + k, or of all flights from seed N',
     )
     made = p.add_argument_group('how it is flown, and what comes out')
-    ensemble_flags.add_workers(made)
+    study_flags.add_workers(made)
     made.add_argument(
         '--batch',
-        type=ensemble_flags.whole(1, 10**6),
+        type=study_flags.whole(1, 10**6),
         default=argparse.SUPPRESS,
         metavar='N',
         help='flights that are handed out and kept at a time (default: 8192)',
@@ -115,7 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         _run(chosen, words, bar)
     except ConfigError as error:
-        thing = throw_flags.flag_of(error, chosen)
+        thing = flags.flag_of(error, chosen)
         thing = _FLAG_OF.get(thing, thing)
         p.error(str(ConfigError(thing, error.value, error.allowed)))
     except DiscSimError as error:
@@ -138,13 +138,13 @@ def _run(chosen: argparse.Namespace, words: Sequence[str], bar: ProgressBar) -> 
     output.check_writable('--output', chosen.output)
     asked = question(chosen, words)
     # pyarrow takes a quarter of a second, and reads nothing that the flags do not allow.
-    from disc_sim_ros.analysis.ensembles import run, summary, texts  # noqa: PLC0415
-    from disc_sim_ros.analysis.ensembles.executors import opened  # noqa: PLC0415
+    from disc_sim_ros.studies import report, runner, summary  # noqa: PLC0415
+    from disc_sim_ros.studies.executors import opened  # noqa: PLC0415
 
-    ensemble_flags.note_compilation('sweep', asked.setup)
+    study_flags.note_compilation('sweep', asked.setup)
     started = time.monotonic()
     with opened(chosen.executor, getattr(chosen, 'workers', None)) as (executor, workers):
-        path = run.sweep(
+        path = runner.sweep(
             asked,
             chosen.output,
             executor=executor,
@@ -160,13 +160,13 @@ def _run(chosen: argparse.Namespace, words: Sequence[str], bar: ProgressBar) -> 
     found = summary.summarise(path, asked)
     if plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415
-        from disc_sim_ros.analysis.ensembles.sweep_plots import figure  # noqa: PLC0415
+        from disc_sim_ros.studies.plots import figure  # noqa: PLC0415
 
         output.write_whole('--plot', plot, plots.image(figure(path, found), _ending(plot)))
     if chosen.json:
-        output.show(json.dumps(texts.summary_document(found), allow_nan=False))
+        output.show(json.dumps(report.summary_document(found), allow_nan=False))
         return
-    lines = [texts.summary_text(found)]
+    lines = [report.summary_text(found)]
     size = path.stat().st_size
     new = bar.new
     rate = f' in {duration(seconds)}, {new / seconds:.0f} flights/s' if new else ''
@@ -176,32 +176,32 @@ def _run(chosen: argparse.Namespace, words: Sequence[str], bar: ProgressBar) -> 
     output.show('\n'.join(lines))
 
 
-def question(chosen: argparse.Namespace, words: Sequence[str]) -> 'Question':
+def question(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
     """Return the question that the flags ask.
 
     Raises:
         ConfigError: They contradict each other, or are out of range.
     """
-    from disc_sim_ros.analysis.ensembles.flying import good_step  # noqa: PLC0415
-    from disc_sim_ros.analysis.ensembles.question import Question  # noqa: PLC0415
+    from disc_sim_ros.studies.flying import good_step  # noqa: PLC0415
+    from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
-    vary = ensemble_flags.grids(listed(chosen, 'vary'))
-    scatter = ensemble_flags.laws(
+    vary = study_flags.grids(listed(chosen, 'vary'))
+    scatter = study_flags.laws(
         *(listed(chosen, name) for name in ('normal', 'uniform', 'scatter'))
     )
     if not vary and not scatter and not (hasattr(chosen, 'count') and chosen.turbulence):
         allowed = 'nothing differs; give --vary, --normal, --uniform or --scatter, or use fly'
         raise ConfigError('--vary', 'nothing', allowed)
-    ensemble_flags.check_given(words, vary, scatter)
-    release, setup, ratio = ensemble_flags.thrown(chosen)
-    asked = Question(
+    study_flags.check_given(words, vary, scatter)
+    release, setup, ratio = study_flags.thrown(chosen)
+    asked = Study(
         setup=setup,
         launch=release,
-        control=throw_flags.control_of(chosen),
+        control=flags.control_of(chosen),
         advance_ratio=ratio,
         vary=vary,
         scatter=scatter,
-        correlations=ensemble_flags.pairs(listed(chosen, 'correlation')),
+        correlations=study_flags.pairs(listed(chosen, 'correlation')),
         count=getattr(chosen, 'count', DEFAULT_COUNT if scatter else 1),
         seed=chosen.seed,
         sampling='sobol' if chosen.sobol else 'random',

@@ -4,13 +4,14 @@ import heapq
 
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.core.equations import DISC_BODY
-from disc_sim_ros.nodes.commands import Commands
-from disc_sim_ros.nodes.flight_bag import BagMedium
-from disc_sim_ros.nodes.outputs import Outputs
-from disc_sim_ros.nodes.sim_config import configuration
-from disc_sim_ros.nodes.simulation import Simulation
-from disc_sim_ros.nodes.topics import STATE_QOS, Frames
+from disc_sim_ros.physics.kernels.equations import DISC_BODY
+from disc_sim_ros.ros.qos import STATE_QOS
+from disc_sim_ros.ros.sim.commands import Commands
+from disc_sim_ros.ros.sim.config import configuration
+from disc_sim_ros.ros.sim.offline_bag import BagSinkFactory
+from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.ros.sim.simulation import Simulation
+from disc_sim_ros.topics import Frames
 
 SECOND = 1_000_000_000
 MS = 1_000_000
@@ -41,7 +42,7 @@ class Made:
     def __init__(self, writer, **changes):
         config = configuration(PARAMETERS | changes)
         frames = Frames.prefixed(config.frame_prefix)
-        self.medium = BagMedium(writer)
+        self.medium = BagSinkFactory(writer)
         self.medium.now = START
         outputs = Outputs(self.medium, frames, with_clock=False)
         self.commands = Commands(None, frames)

@@ -3,16 +3,16 @@
 from contextlib import suppress
 from pathlib import Path
 
-from bags.making import ODOMETRIES, ODOMETRY, START, STEP, STRING, everything, text, topic
 from mcap.opcode import Opcode
 import numpy as np
 import pytest
 
-from disc_sim_ros.bags.contents import HEAD
-from disc_sim_ros.bags.errors import BagError
+from bags.making import ODOMETRIES, ODOMETRY, START, STEP, STRING, everything, text, topic
+from disc_sim_ros.bags.mcap_records import HEAD
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
 from disc_sim_ros.bags.writer import BagWriter
+from disc_sim_ros.errors import BagError
 
 pytest.importorskip('rclpy')
 

@@ -3,6 +3,15 @@
 import json
 from pathlib import Path
 
+from mcap import records
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import get_types_from_msg
+import yaml
+
 from bags.making import (
     ODOMETRIES,
     ODOMETRY,
@@ -13,15 +22,6 @@ from bags.making import (
     topic,
     write_bag,
 )
-from mcap import records
-from mcap.reader import make_reader
-from mcap.stream_reader import StreamReader
-from mcap_ros2.decoder import DecoderFactory
-import pytest
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import get_types_from_msg
-import yaml
-
 from disc_sim_ros.bags import qos, schemas
 from disc_sim_ros.bags.qos import INFINITE, Qos
 from disc_sim_ros.bags.reader import open_bag

@@ -6,16 +6,16 @@ import subprocess
 import sys
 import time
 
-from bags.making import everything
 import numpy as np
 import pytest
 import yaml
 
-from disc_sim_ros.bags.errors import BagError
+from bags.making import everything
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
+from disc_sim_ros.errors import BagError
 
 RATE = 4000  # Hz
 LONGEST_LOSS = 1.0  # s, what is promised
@@ -129,7 +129,7 @@ def test_a_file_that_may_not_grow_stays_readable(tmp_path):
     code = f"""
 import os, resource, signal, sys
 from pathlib import Path
-from disc_sim_ros.bags.errors import BagError
+from disc_sim_ros.errors import BagError
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -1,5 +1,11 @@
 """Bags of others, bags in pieces, and what is no bag at all."""
 
+from mcap.writer import CompressionType, IndexType, Writer
+import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+import yaml
+
 from bags.making import (
     ODOMETRIES,
     ODOMETRY,
@@ -12,17 +18,11 @@ from bags.making import (
     topic,
     write_bag,
 )
-from mcap.writer import CompressionType, IndexType, Writer
-import pytest
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
-import yaml
-
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.errors import BagError
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
 from disc_sim_ros.bags.writer import BagWriter
+from disc_sim_ros.errors import BagError
 
 pytest.importorskip('rclpy')
 

@@ -9,21 +9,20 @@ import subprocess
 import sys
 import time
 
-from bags.making import ODOMETRIES, ODOMETRY, START, STEP, TYPES, everything, topic, write_bag
 from mcap.reader import make_reader
 from mcap.writer import Writer
 import pytest
 from rosbags.rosbag2 import Reader
 import yaml
 
+from bags.making import ODOMETRIES, ODOMETRY, START, STEP, TYPES, everything, topic, write_bag
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.errors import BagError
 from disc_sim_ros.bags.qos import Qos
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli.repair_bag import main
-from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros.errors import BagError, ConfigError
 
 pytest.importorskip('rclpy')
 

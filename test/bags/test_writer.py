@@ -3,6 +3,11 @@
 import os
 from pathlib import Path
 
+from mcap.reader import make_reader
+import pytest
+from rosbags.rosbag2 import Reader
+import yaml
+
 from bags.making import (
     ODOMETRIES,
     ODOMETRY,
@@ -14,16 +19,10 @@ from bags.making import (
     topic,
     write_bag,
 )
-from mcap.reader import make_reader
-import pytest
-from rosbags.rosbag2 import Reader
-import yaml
-
-from disc_sim_ros.bags.errors import BagError
 from disc_sim_ros.bags.qos import Qos
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.core.errors import ConfigError
+from disc_sim_ros.errors import BagError, ConfigError
 
 pytest.importorskip('rclpy')
 

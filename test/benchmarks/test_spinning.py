@@ -13,11 +13,11 @@ SCRIPT = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
 from spinning import flown, released
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
 
-setup = Setup(disc=catalogue.load('frisbee'), step=1e-3)
+setup = Setup(disc=disc_file.load_disc('frisbee'), step=1e-3)
 parts = (setup.plant, setup.disc.table_rows, setup.disc.spin_terms)
 launch = Launch(roll=20.0, spin=25.0, roll_rate=2.0, pitch_rate=-1.0, height=1.0)
 ends = [flown(released(launch.state(), axes), axes, 1e-3, 0.2, *parts) for axes in range(3)]

@@ -3,18 +3,18 @@
 from collections.abc import Callable
 import json
 
-from cli.fly_command import Result
 import pytest
 
+from cli.fly_command import Result
 from disc_sim_ros.cli import fly as program
-from disc_sim_ros.core import catalogue, flight
-from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.physics import disc_file, flight
+from disc_sim_ros.physics.launch import Launch
 
 
 @pytest.fixture(scope='module')
 def compiled():
     """Compile first, so that no test sees the note about it."""
-    flight.fly(Launch(), flight.Setup(disc=catalogue.load('frisbee')))
+    flight.fly(Launch(), flight.Setup(disc=disc_file.load_disc('frisbee')))
 
 
 @pytest.fixture

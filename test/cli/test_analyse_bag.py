@@ -8,12 +8,12 @@ import shutil
 import subprocess
 import sys
 
-from analysis import foreign
-from analysis.foreign import START, Parabola
 from matplotlib import image
 import numpy as np
 import pytest
 
+from analysis import foreign
+from analysis.foreign import START, Parabola
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.cli import analyse_bag, fly
 
@@ -186,16 +186,16 @@ def test_a_bag_that_begins_in_flight_says_what_it_lacks(document, part):
 
 def test_a_change_of_the_profile_of_the_wind_is_named(document, tmp_path):
     pytest.importorskip('rclpy')
-    from analysis import bags
     from rcl_interfaces.msg import Parameter, ParameterEvent
     from rclpy.serialization import serialize_message
 
+    from analysis import bags
     from disc_sim_ros.bags.writer import BagWriter
-    from disc_sim_ros.nodes.sim_config import configuration
+    from disc_sim_ros.ros.sim.config import configuration
 
     rougher = {'wind.roughness_length': 0.8}
     with BagWriter(tmp_path / 'bag') as writer:
-        events = bags.BagMedium(writer).channel(ParameterEvent, '/parameter_events', bags.QOS)
+        events = bags.BagSinkFactory(writer).channel(ParameterEvent, '/parameter_events', bags.QOS)
         made = bags.Made(writer)
         made.go(0.2)
         made.requests.append(
@@ -242,7 +242,6 @@ def test_an_unfinished_bag_is_read_and_called_so(analyse, steered, tmp_path):
 def test_two_discs_of_one_topic_have_a_report_each(document, analyse, tmp_path):
     pytest.importorskip('rclpy')
     from analysis import bags
-
     from disc_sim_ros.bags.writer import BagWriter
 
     with BagWriter(tmp_path / 'red') as writer:

@@ -3,15 +3,15 @@
 import math
 import re
 
-from cli.fly_command import ARRAYS, DIAMETER, ROUNDING, Result, paper_velocity
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cli.fly_command import ARRAYS, DIAMETER, ROUNDING, Result, paper_velocity
 from disc_sim_ros import __version__
-from disc_sim_ros.core import catalogue, flight
-from disc_sim_ros.core.launch import Launch
+from disc_sim_ros.physics import disc_file, flight
+from disc_sim_ros.physics.launch import Launch
 
 pytestmark = pytest.mark.usefixtures('compiled')
 
@@ -133,7 +133,7 @@ def test_the_angle_of_attack_is_that_of_the_attitude(document, arguments):
     given = {name: launch[f'{name}_{unit}'] for name, unit in zip(names, units, strict=True)}
     rates = {name: launch[f'{name}_rad_s'] for name in ('roll_rate', 'pitch_rate')}
     wind = tuple(launch['wind_m_s'] * np.array([1.0, -1.0, -1.0]))
-    setup = flight.Setup(disc=catalogue.load('frisbee'), wind=flight.Wind(mean=wind))
+    setup = flight.Setup(disc=disc_file.load_disc('frisbee'), wind=flight.Wind(mean=wind))
     flown = flight.fly(Launch(**given, **rates), setup, sample_rate=50.0)
     attitude = Rotation.from_quat(np.roll(flown.trajectory.attitude, -1, axis=1))
     through_air = (np.array(found['velocity_m_s']) - launch['wind_m_s']) * (1, -1, -1)

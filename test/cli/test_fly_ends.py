@@ -8,12 +8,12 @@ import signal
 import subprocess
 import threading
 
-from cli.fly_command import EXECUTABLE, Result, environment, start, table_of
 from numpy.testing import assert_allclose
 import pytest
 
+from cli.fly_command import EXECUTABLE, Result, environment, start, table_of
 from disc_sim_ros.cli import fly as program
-from disc_sim_ros.core import catalogue, flight
+from disc_sim_ros.physics import disc_file, flight
 
 pytestmark = pytest.mark.usefixtures('compiled')
 
@@ -38,7 +38,7 @@ def test_ctrl_c_elsewhere_leaves_no_traceback(fly, monkeypatch):
     def interrupted(_: str) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(catalogue, 'load', interrupted)
+    monkeypatch.setattr(disc_file, 'load_disc', interrupted)
     assert fly() == Result(130, '', '')
 
 

@@ -10,13 +10,13 @@ import sys
 import threading
 import xml.etree.ElementTree as ET
 
-from cli.fly_command import ARRAYS, Result, refused, table_of
 from matplotlib import image
 import pytest
 
+from cli.fly_command import ARRAYS, Result, refused, table_of
 from disc_sim_ros.cli import output
-from disc_sim_ros.core import flight
-from disc_sim_ros.core.errors import DiscSimError
+from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics import flight
 
 pytestmark = pytest.mark.usefixtures('compiled')
 

@@ -5,12 +5,12 @@ import json
 import math
 import re
 
-from cli.fly_command import DIAMETER, ROUNDING
 import numpy as np
 from numpy.testing import assert_allclose
 import pytest
 
-from disc_sim_ros.core import flight
+from cli.fly_command import DIAMETER, ROUNDING
+from disc_sim_ros.physics import flight
 
 pytestmark = pytest.mark.usefixtures('compiled')
 

@@ -3,10 +3,10 @@
 import json
 import re
 
-from cli.fly_command import refused
 import pytest
 
-from disc_sim_ros.core import flight
+from cli.fly_command import refused
+from disc_sim_ros.physics import flight
 
 pytestmark = pytest.mark.usefixtures('compiled')
 

@@ -15,9 +15,9 @@ import numpy as np
 from pyarrow import parquet
 import pytest
 
-from disc_sim_ros.analysis.ensembles.quantities import QUANTITIES
 from disc_sim_ros.cli import fly, optimise, sweep
 from disc_sim_ros.cli.progress import duration, progress_text
+from disc_sim_ros.studies.columns import QUANTITIES
 
 BIN = Path(sys.executable).parent
 

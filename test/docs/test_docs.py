@@ -22,12 +22,13 @@ from matplotlib.image import imread
 import numpy as np
 import pytest
 
-from disc_sim_ros.analysis import report
+from disc_sim_ros.analysis import flight_report
 from disc_sim_ros.cli.fly import parser
-from disc_sim_ros.core import aerodynamics, air, axes, catalogue, derived, disc, equations
-from disc_sim_ros.core.flight import Flight, Setup, fly
-from disc_sim_ros.core.launch import LIMITS, Launch
-from disc_sim_ros.core.trajectory import Trajectory
+from disc_sim_ros.physics import disc, disc_file, environment, frames, theory
+from disc_sim_ros.physics.flight import Flight, Setup, fly
+from disc_sim_ros.physics.kernels import aerodynamics, equations
+from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
@@ -127,7 +128,7 @@ COMPLETE = {
     equations: ['State', 'Plant', 'Velocity', 'Control', 'Flow', 'Coefficients', 'Moment'],
     aerodynamics: ['Linear'],
     disc: ['Disc', 'LinearAero', 'AeroTable', 'SpinTable'],
-    air: ['Air', 'Wind'],
+    environment: ['Air', 'Wind'],
 }
 
 
@@ -156,10 +157,13 @@ def properties_of(cls: type) -> list[str]:
 
 
 def exists(name: str) -> bool:
-    """Say whether `module.function` or `module.Class.field` exists below disc_sim_ros.core."""
+    """Say whether `module.function` or `module.Class.field` is in physics or its kernels."""
     module, *path = name.split('.')
-    full = f'disc_sim_ros.core.{module}'
-    if not path or importlib.util.find_spec(full) is None:
+    places = ('disc_sim_ros.physics', 'disc_sim_ros.physics.kernels')
+    full = next(
+        (f'{p}.{module}' for p in places if importlib.util.find_spec(f'{p}.{module}')), None
+    )
+    if not path or full is None:
         return False
     thing = importlib.import_module(full)
     for i, part in enumerate(path):
@@ -194,14 +198,14 @@ def test_every_name_in_the_code_column_exists():
 
 
 def test_every_other_name_of_a_module_exists():
-    modules = {path.stem for path in (ROOT / 'disc_sim_ros' / 'core').glob('*.py')}
+    modules = {path.stem for path in (ROOT / 'disc_sim_ros' / 'physics').rglob('*.py')}
     dotted = {n for n in names_in(SYMBOLS) if n.split('.')[0] in modules and '.' in n}
     classes = {'equations.State', 'equations.Moment', 'equations.Coefficients'}
     assert sorted(n for n in dotted if not exists(n) and n not in classes) == []
 
 
 @pytest.mark.parametrize(
-    'name', ['equatons.State.X', 'equations.State.W', 'equations.State.count', 'derived.gone',
+    'name', ['equatons.State.X', 'equations.State.W', 'equations.State.count', 'theory.gone',
              'disc.Disc.weight', 'launch'],
 )  # fmt: skip
 def test_a_name_that_is_not_there_is_noticed(name):
@@ -224,10 +228,10 @@ def test_no_field_is_missing(cls):
 def test_no_derived_quantity_is_missing():
     functions = {
         name
-        for name, value in vars(derived).items()
-        if inspect.isfunction(value) and value.__module__ == derived.__name__
+        for name, value in vars(theory).items()
+        if inspect.isfunction(value) and value.__module__ == theory.__name__
     }
-    assert {f'derived.{name}' for name in functions if name[0] != '_'} <= documented()
+    assert {f'theory.{name}' for name in functions if name[0] != '_'} <= documented()
 
 
 def test_flags_of_fly_exist_and_those_of_a_launch_are_all_there():
@@ -239,14 +243,14 @@ def test_flags_of_fly_exist_and_those_of_a_launch_are_all_there():
 
 
 def test_yaml_keys_are_those_of_the_catalogue():
-    properties = {*catalogue._PROPERTIES, 'description', 'based_on', 'aero'}
-    sections = {f'{s}.{key}' for s, keys in catalogue._SECTIONS.items() for key in keys}
+    properties = {*disc_file._PROPERTIES, 'description', 'based_on', 'aero'}
+    sections = {f'{s}.{key}' for s, keys in disc_file._SECTIONS.items() for key in keys}
     assert elsewhere('YAML') == properties | sections
 
 
 def test_json_keys_are_those_of_fly():
-    flight = fly(Launch(), Setup(disc=catalogue.load('frisbee')), sample_rate=2.0)
-    document = report.document(flight)
+    flight = fly(Launch(), Setup(disc=disc_file.load_disc('frisbee')), sample_rate=2.0)
+    document = flight_report.document(flight)
     of_no_quantity = {'version', 'wind'}  # `wind` holds the fields of Wind under their own names
     known = set(document) | set(document['launch'])
     assert elsewhere('JSON') == known - of_no_quantity
@@ -371,7 +375,7 @@ def sense(points: np.ndarray) -> np.ndarray:
 
 
 def flying(velocity: np.ndarray, theta: float) -> equations.State:
-    e = axes.quaternion_from_euler(0.0, theta, 0.0)
+    e = frames.quaternion_from_euler(0.0, theta, 0.0)
     return equations.State(0.0, 0.0, 0.0, *(10.0 * velocity), *e, 0.0, 0.0, 30.0, 0.0)
 
 
@@ -389,14 +393,14 @@ def test_the_side_view_draws_what_the_equations_do(make_axes, drawn, page):
     assert np.allclose(end, view['$x_4$'])
     assert math.isclose(a.alpha, math.acos(start @ end))
 
-    plant = Setup(disc=catalogue.load('frisbee')).plant
+    plant = Setup(disc=disc_file.load_disc('frisbee')).plant
     nothing = equations.Coefficients(0.0, 0.0, 0.0, 0.0, 0.0)
     e = s[6:10]
     for label, name in (('$C_{Lift}$', 'Lift'), ('$C_{Drag}$', 'Drag')):
-        F = axes.earth_from_body(e, equations.force(a, nothing._replace(**{name: 1.0}), plant))
+        F = frames.earth_from_body(e, equations.force(a, nothing._replace(**{name: 1.0}), plant))
         assert np.allclose(view[label], F / np.linalg.norm(F))
     m = equations.moment(a, s, nothing, plant, equations.Control(C_M=1.0))
-    M = np.array(axes.earth_from_body(e, (m.L, m.M, 0.0)))
+    M = np.array(frames.earth_from_body(e, (m.L, m.M, 0.0)))
     assert np.allclose(sense(view['$C_M$']), M / np.linalg.norm(M))
 
 
@@ -408,7 +412,7 @@ def test_the_view_from_above_draws_what_the_equations_do(make_axes, drawn, page)
     assert np.allclose(
         view['$\\beta$'][-1] / np.linalg.norm(view['$\\beta$'][-1]), (a.d_x, a.d_y, 0)
     )
-    plant = Setup(disc=catalogue.load('frisbee')).plant
+    plant = Setup(disc=disc_file.load_disc('frisbee')).plant
     F = equations.force(a, equations.Coefficients(0.0, 0.0, 1.0, 0.0, 0.0), plant)
     assert np.allclose(view['$y_3$'], F / np.linalg.norm(F))  # C_Side is written beside it
     assert np.allclose(view['$y$'], -view['$y_3$'])
@@ -438,7 +442,7 @@ def test_angles_are_drawn_from_the_old_axis_to_the_new(three_angles, drawing, la
     points, start, end = (view[label] for label in labels)
     assert np.allclose(points[0] / np.linalg.norm(points[0]), start)
     assert np.allclose(points[-1] / np.linalg.norm(points[-1]), end, atol=1e-9)
-    _, *about = axes.quaternion_from_euler(**{'phi': 0.0, 'theta': 0.0, 'psi': 0.0, **positive})
+    _, *about = frames.quaternion_from_euler(**{'phi': 0.0, 'theta': 0.0, 'psi': 0.0, **positive})
     assert np.allclose(sense(points), about / np.linalg.norm(about))
 
 

@@ -9,11 +9,13 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from disc_sim_ros.nodes import conversions, outputs, topics
-from disc_sim_ros.nodes.topics import Frames
+from disc_sim_ros import topics
+from disc_sim_ros.ros import messages, qos
+from disc_sim_ros.ros.sim import publishers
+from disc_sim_ros.topics import Frames
 
 ROOT = Path(__file__).parents[2]
-NODES = ROOT / 'disc_sim_ros/nodes'
+NODES = ROOT / 'disc_sim_ros/ros'
 PAGE = (ROOT / 'docs/topics.md').read_text(encoding='utf-8')
 TAKEN = {topics.CMD_MOMENT, topics.CMD_COEFFICIENTS, topics.WIND, topics.THROW}
 
@@ -48,7 +50,7 @@ def test_every_topic_is_there_and_no_other():
 def test_types_are_those_of_the_code(types_of_topics):
     told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Published')}
     told |= {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Taken')}
-    missing = {topics.TF} if outputs.TFMessage is None else set()
+    missing = {topics.TF} if publishers.TFMessage is None else set()
     assert {name: told[name] for name in told.keys() - missing} == types_of_topics
     assert told[topics.TF] == 'TFMessage'
 
@@ -58,8 +60,8 @@ def types_of_topics() -> dict[str, str]:
     """The types of all topics, found by making them with a node that only takes note."""
     from diagnostic_msgs.msg import DiagnosticArray
 
-    from disc_sim_ros.nodes.channels import NodeMedium
-    from disc_sim_ros.nodes.commands import Commands
+    from disc_sim_ros.ros.sim.commands import Commands
+    from disc_sim_ros.ros.sinks import PublisherSinkFactory
 
     class Note:
         """Stands in for a node, so that this page is tested without a network."""
@@ -78,32 +80,34 @@ def types_of_topics() -> dict[str, str]:
             return '/sim_node'
 
     note = Note()
-    outputs.Outputs(NodeMedium(note), Frames(), with_clock=True)
+    publishers.Outputs(PublisherSinkFactory(note), Frames(), with_clock=True)
     Commands(note, Frames())
     return note.types
 
 
 def test_latched_topics_are_called_so():
-    latched = set(re.findall(r'topics\.(\w+), topics\.LATCHED_QOS', source('outputs')))
+    latched = set(
+        re.findall(r'topics\.(\w+), (?:ros_)?qos\.LATCHED_QOS', source('sim/publishers'))
+    )
     told = {row[0].strip('`') for row in rows('Published') if 'latched' in row[-1]}
     assert told == {getattr(topics, name) for name in latched}
     assert len(told) == 4
 
 
 def test_every_service_is_there_and_no_other():
-    made = re.findall(r"create_service\((\w+), '([^']+)'", source('sim_node'))
+    made = re.findall(r"create_service\((\w+), '([^']+)'", source('sim/node'))
     told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Services')}
     assert told == {name: kind for kind, name in made}
 
 
 def test_every_event_is_there_and_no_other():
-    assert set(named('Events')) == set(re.findall(r"_event\('([^']+)'", source('simulation')))
+    assert set(named('Events')) == set(re.findall(r"_event\('([^']+)'", source('sim/simulation')))
 
 
 def test_every_value_of_an_event_is_there():
     events = re.split('^### Events$', PAGE, flags=re.MULTILINE)[1].partition('\n## ')[0]
     told = set(re.findall(r'`(\w+)`', events))
-    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('simulation'))
+    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim/simulation'))
     assert set(made) <= told
 
 
@@ -113,22 +117,22 @@ def test_every_frame_is_there_and_no_other():
 
 def test_limits_are_those_of_the_code():
     taken = {row[0].strip('`'): row[2] for row in rows('Taken')}
-    assert f'up to {conversions.LARGEST_MOMENT:g} N m' in taken[topics.CMD_MOMENT]
-    assert f'up to {conversions.LARGEST_COEFFICIENT:g}' in taken[topics.CMD_COEFFICIENTS]
-    assert f'up to {conversions.LARGEST_WIND:g} m/s' in taken[topics.WIND]
-    assert f'up to {conversions.LARGEST_POSITION / 1000:g} km' in taken[topics.THROW]
-    assert f'up to {conversions.LARGEST_SPEED:g} m/s' in taken[topics.THROW]
-    assert f'up to {conversions.LARGEST_RATE:g} rad/s' in taken[topics.THROW]
+    assert f'up to {messages.LARGEST_MOMENT:g} N m' in taken[topics.CMD_MOMENT]
+    assert f'up to {messages.LARGEST_COEFFICIENT:g}' in taken[topics.CMD_COEFFICIENTS]
+    assert f'up to {messages.LARGEST_WIND:g} m/s' in taken[topics.WIND]
+    assert f'up to {messages.LARGEST_POSITION / 1000:g} km' in taken[topics.THROW]
+    assert f'up to {messages.LARGEST_SPEED:g} m/s' in taken[topics.THROW]
+    assert f'up to {messages.LARGEST_RATE:g} rad/s' in taken[topics.THROW]
 
 
 def test_numbers_of_the_text_are_those_of_the_code():
-    from disc_sim_ros.nodes import commands, markers, pacer
+    from disc_sim_ros.ros.sim import commands, markers, realtime
 
-    assert f'the last {outputs.LONGEST_PATH}' in PAGE
+    assert f'the last {publishers.LONGEST_PATH}' in PAGE
     assert f'the disc {markers.ENLARGEMENT:g} times enlarged' in PAGE
     assert f'lines every {markers.FIELD_SPACING:g} m' in PAGE
     assert f'At most {commands.MOST_WAITING} of a topic' in PAGE
-    assert f'up to {pacer.CATCH_UP:g} s of wall time' in PAGE
-    assert f'every {topics.CLOCK_PERIOD * 1000:g} ms of wall time' in PAGE
-    assert f'keeps the last {topics.STATE_QOS.depth} messages' in PAGE
-    assert f'Reliable, the last {topics.COMMAND_QOS.depth}.' in PAGE
+    assert f'up to {realtime.CATCH_UP:g} s of wall time' in PAGE
+    assert f'every {qos.CLOCK_PERIOD * 1000:g} ms of wall time' in PAGE
+    assert f'keeps the last {qos.STATE_QOS.depth} messages' in PAGE
+    assert f'Reliable, the last {qos.COMMAND_QOS.depth}.' in PAGE

@@ -1,5 +1,5 @@
 """The examples talk to real simulators, as the tests of the nodes do."""
 
-from nodes.conftest import ros, ros_context, ros_environment
+from ros.conftest import ros, ros_context, ros_environment
 
 __all__ = ['ros', 'ros_context', 'ros_environment']

@@ -18,19 +18,19 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
 import numpy as np
 
+from disc_sim_ros import topics
 from disc_sim_ros.bags.reader import open_bag
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.air import Wind
-from disc_sim_ros.core.equations import Control
-from disc_sim_ros.core.flight import Setup, fly
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.core.simulator import FlightSimulator
-from disc_sim_ros.nodes import topics
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.environment import Wind
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.simulator import FlightSimulator
 
 pytestmark = pytest.mark.ros
 
 EXAMPLES = Path(__file__).parents[2] / 'examples'
-FRISBEE = Setup(disc=catalogue.load('frisbee'))
+FRISBEE = Setup(disc=disc_file.load_disc('frisbee'))
 WAITING = {'auto_throw': False, 'real_time_factor': 4.0}
 DEADLINE = 180.0  # s for what takes 20 on an idle machine
 

@@ -5,22 +5,22 @@ import json
 import math
 import struct
 
-from analysis import bags as flight_bags
 import numpy as np
 import pytest
 
+from analysis import bags as flight_bags
+
 pytest.importorskip('rclpy')
 
-from disc_sim_ros.analysis import kinematics, recording, refly
-from disc_sim_ros.analysis.motion import Motion, motions
+from disc_sim_ros.analysis import checks, recording, resimulate
+from disc_sim_ros.analysis.odometry import Motion, motions
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.errors import BagError
 from disc_sim_ros.bags.reader import RawMessage, open_bag
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli import analyse_bag
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
+from disc_sim_ros.physics import disc_file
 
 START = 1_700_000_000_000_000_000  # ns
 
@@ -30,7 +30,7 @@ def test_a_disc_whose_area_is_no_number_is_refused(tmp_path, diameter):
     file = tmp_path / 'huge.yaml'
     file.write_text(f'based_on: frisbee\ndiameter_m: {diameter}\n')
     with pytest.raises(ConfigError):
-        catalogue.load(str(file))
+        disc_file.load_disc(str(file))
 
 
 # The parser of definitions raises something else for each of them.
@@ -84,14 +84,14 @@ def motion_with(quaternions, stamps):
 
 def test_stamps_that_stand_still_tell_of_no_spin():
     still = motion_with([(0.0, 0.0, 0.0, 1.0)] * 3, [START] * 3)
-    assert not kinematics.turns_with_spin(still)
+    assert not checks.turns_with_spin(still)
 
 
 @pytest.mark.parametrize('length', [0.0, 1e-200, 5e-324, 1e200, math.inf, math.nan])
 def test_a_quaternion_of_any_length_is_no_crash(length):
     quaternions = [(0.0, 0.0, 0.0, 1.0), (length, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, length)]
     odd = motion_with(quaternions, [START, START + 10_000_000, START + 20_000_000])
-    assert isinstance(kinematics.turns_with_spin(odd), bool)
+    assert isinstance(checks.turns_with_spin(odd), bool)
 
 
 @pytest.fixture(scope='module')
@@ -117,16 +117,16 @@ def reconfigured(flight, **changes):
 @pytest.mark.parametrize('key', ['publish_rate', 'physics_rate', 'ground', 'wind', 'disc_file'])
 def test_a_configuration_that_lacks_something_is_refused(steered, key):
     flight = flight_of(steered)
-    refly.compare(flight, refly.fly_again(flight))  # whole it is one
+    resimulate.compare(flight, resimulate.fly_again(flight))  # whole it is one
     with pytest.raises(DiscSimError):
-        refly.fly_again(reconfigured(flight, **{key: None}))
+        resimulate.fly_again(reconfigured(flight, **{key: None}))
 
 
 @pytest.mark.parametrize('key', ['publish_rate', 'physics_rate'])
 @pytest.mark.parametrize('value', [0, -1.0, '\0', 'fast', 10**400, math.nan, [], {}])
 def test_a_rate_that_is_none_is_refused(steered, key, value):
     with pytest.raises(DiscSimError) as refused:
-        refly.fly_again(reconfigured(flight_of(steered), **{key: value}))
+        resimulate.fly_again(reconfigured(flight_of(steered), **{key: value}))
     assert '\n' not in str(refused.value)
 
 
@@ -135,14 +135,14 @@ def test_a_release_that_is_no_state_is_refused(steered, value):
     flight = flight_of(steered)
     release = {**flight.release.configuration['release'], 'X': value}
     with pytest.raises(DiscSimError):
-        refly.fly_again(reconfigured(flight, release=release))
+        resimulate.fly_again(reconfigured(flight, release=release))
 
 
 def test_a_landing_that_tells_no_number_differs(steered):
     flight = flight_of(steered)
     values = {**flight.landing.values, 'range_m': 'far'}
     changed = replace(flight, landing=replace(flight.landing, values=values))
-    verdict = refly.compare(changed, refly.fly_again(changed))
+    verdict = resimulate.compare(changed, resimulate.fly_again(changed))
     assert verdict.largest['landed.range_m'] == math.inf
     assert not verdict.exact
 
@@ -154,7 +154,7 @@ def test_a_moment_in_a_frame_that_is_not_of_the_disc_is_left_out_and_told(steere
         for c in flight.disc.changes
     )
     changed = replace(flight, disc=replace(flight.disc, changes=changes))
-    verdict = refly.compare(changed, refly.fly_again(changed))
+    verdict = resimulate.compare(changed, resimulate.fly_again(changed))
     assert not verdict.exact
     assert any(
         "moments in 'disc_\\x01': no frame of the disc" in doubt for doubt in verdict.doubts
@@ -167,7 +167,7 @@ def test_moments_are_those_of_the_disc_whatever_its_prefix(tmp_path, prefix):
     flight = flight_of(made)
     moments = [c for c in flight.disc.changes if c.topic == 'applied_moment']
     assert {c.frame for c in moments} == {f'{prefix}disc_body', f'{prefix}disc_air'}
-    verdict = refly.compare(flight, refly.fly_again(flight))
+    verdict = resimulate.compare(flight, resimulate.fly_again(flight))
     assert verdict.exact
     assert not verdict.doubts
 

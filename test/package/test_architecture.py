@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = 'disc_sim_ros'
-MAY_TALK_ROS = {'cli', 'nodes'}
+MAY_TALK_ROS = {'cli', 'ros'}
 
 
 def contracts() -> dict[str, dict]:
@@ -26,7 +26,7 @@ def tree(tmp_path) -> Path:
         ROOT / PACKAGE, tmp_path / PACKAGE, ignore=shutil.ignore_patterns('__pycache__')
     )
     shutil.copy(ROOT / 'pyproject.toml', tmp_path)
-    for folder in ('analysis', 'bags', 'cli', 'core', 'experiments', 'nodes'):
+    for folder in ('analysis', 'bags', 'cli', 'paper', 'physics', 'ros', 'studies'):
         (tmp_path / PACKAGE / folder).mkdir(exist_ok=True)
         (tmp_path / PACKAGE / folder / '__init__.py').touch()
     return tmp_path
@@ -51,16 +51,22 @@ def test_the_import_rules_hold(tree):
 @pytest.mark.parametrize(
     ('where', 'line', 'broken'),
     [
-        ('core', 'import rclpy', 'only nodes and cli talk ROS'),
-        ('core', 'from nav_msgs.msg import Odometry', 'only nodes and cli talk ROS'),
-        ('analysis', 'import rclpy', 'only nodes and cli talk ROS'),
-        ('core', 'import matplotlib', 'the physics draws nothing and records nothing'),
-        ('core', 'import mcap', 'the physics draws nothing and records nothing'),
-        ('core', f'import {PACKAGE}.bags', 'one way, down to the physics'),
-        ('bags', f'import {PACKAGE}.analysis', 'one way, down to the physics'),
-        ('experiments', f'import {PACKAGE}.nodes', 'one way, down to the physics'),
-        ('nodes', f'import {PACKAGE}.analysis', 'nodes and analysis are strangers'),
-        ('nodes', f'import {PACKAGE}.cli', 'one way, down to the physics'),
+        ('physics', 'import rclpy', 'only ros and cli know ROS'),
+        ('physics', 'from nav_msgs.msg import Odometry', 'only ros and cli know ROS'),
+        ('analysis', 'import rclpy', 'only ros and cli know ROS'),
+        ('physics', 'import matplotlib', 'the physics draws nothing and records nothing'),
+        ('physics', 'import mcap', 'the physics draws nothing and records nothing'),
+        ('physics', f'import {PACKAGE}.bags', 'one direction, down to the physics'),
+        ('bags', f'import {PACKAGE}.analysis', 'one direction, down to the physics'),
+        ('paper', f'import {PACKAGE}.ros', 'one direction, down to the physics'),
+        ('analysis', f'import {PACKAGE}.studies', 'one direction, down to the physics'),
+        ('physics', 'import scipy', 'the physics draws nothing and records nothing'),
+        (
+            'physics/kernels',
+            f'import {PACKAGE}.validation',
+            'the kernels are arithmetic: no files, no messages, no units for people',
+        ),
+        ('ros', f'import {PACKAGE}.cli', 'one direction, down to the physics'),
     ],
 )
 def test_the_linter_sees_a_violation(tree, where, line, broken):
@@ -74,8 +80,8 @@ def test_the_linter_sees_a_violation(tree, where, line, broken):
 def test_every_folder_is_under_the_rules():
     """A folder made later must not slip through because no contract names it."""
     folders = {path.parent.name for path in (ROOT / PACKAGE).glob('*/__init__.py')}
-    layers = ' '.join(contracts()['one way, down to the physics']['layers'])
-    silent = contracts()['only nodes and cli talk ROS']['source_modules']
+    layers = ' '.join(contracts()['one direction, down to the physics']['layers'])
+    silent = contracts()['only ros and cli know ROS']['source_modules']
     for folder in folders:
         assert f'{PACKAGE}.{folder}' in layers
         assert folder in MAY_TALK_ROS or f'{PACKAGE}.{folder}' in silent

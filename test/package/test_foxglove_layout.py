@@ -14,12 +14,12 @@ pytest.importorskip('rclpy')
 from nav_msgs.msg import Path as PathMessage
 from visualization_msgs.msg import MarkerArray
 
-from disc_sim_ros.core import axes
-from disc_sim_ros.core.flight import fly
-from disc_sim_ros.nodes import topics
-from disc_sim_ros.nodes.outputs import Outputs
-from disc_sim_ros.nodes.sim_config import configuration
-from disc_sim_ros.nodes.topics import Frames
+from disc_sim_ros import topics
+from disc_sim_ros.physics import frames as paper_frames
+from disc_sim_ros.physics.flight import fly
+from disc_sim_ros.ros.sim.config import configuration
+from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.topics import Frames
 
 ROOT = Path(__file__).parents[2]
 LAYOUT = json.loads((ROOT / 'config/foxglove_layout.json').read_text(encoding='utf-8'))
@@ -194,7 +194,7 @@ def on_screen(panel: dict, points: np.ndarray, aspect: float) -> np.ndarray:
 @pytest.mark.parametrize('aspect', [WIDEST, NARROWEST])
 def test_the_field_shows_the_flight_from_release_to_landing(flight, aspect):
     t = flight.trajectory
-    flown = np.vstack((axes.map_from_paper(t.position), flight.position))
+    flown = np.vstack((paper_frames.map_from_paper(t.position), flight.position))
     seen = on_screen(FIELD, flown, aspect)
     assert np.abs(seen).max() < 0.95
     assert np.ptp(seen[:, 0]) > 0.8  # over 2: it does not fly in a corner

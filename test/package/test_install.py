@@ -104,7 +104,7 @@ def check_files(prefix: Path) -> None:
 def check_package_data(site: Path) -> None:
     assert (site / PACKAGE / 'py.typed').is_file()
     for name in source_files():
-        if name.parts[:3] == (PACKAGE, 'core', 'discs') and name.suffix == '.yaml':
+        if name.parts[:3] == (PACKAGE, 'physics', 'discs') and name.suffix == '.yaml':
             assert (site / name).is_file(), f'{name} is not installed'
 
 

@@ -18,13 +18,15 @@ import yaml
 
 pytest.importorskip('rclpy')
 
-from disc_sim_ros.core import catalogue
-from disc_sim_ros.core.launch import Launch
-from disc_sim_ros.nodes import conversions, markers, topics
-from disc_sim_ros.nodes.parameter_table import TABLE
-from disc_sim_ros.nodes.recorder_config import RECORDER_TABLE
-from disc_sim_ros.nodes.sim_config import configuration
-from disc_sim_ros.nodes.topics import Frames
+from disc_sim_ros import topics
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros import messages
+from disc_sim_ros.ros.recorder.options import RECORDER_TABLE
+from disc_sim_ros.ros.sim import markers
+from disc_sim_ros.ros.sim.config import configuration
+from disc_sim_ros.ros.sim.parameters import TABLE
+from disc_sim_ros.topics import Frames
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = 'disc_sim_ros'
@@ -233,7 +235,7 @@ def test_the_recorder_is_given_time_before_the_throw(load, namespace, service):
     assert later.kwargs['period'] == 3.0
     (call,) = later.kwargs['actions']
     assert call.kwargs['cmd'] == ['ros2', 'service', 'call', service, 'std_srvs/srv/Trigger']
-    source = (ROOT / PACKAGE / 'nodes/sim_node.py').read_text(encoding='utf-8')
+    source = (ROOT / PACKAGE / 'ros/sim/node.py').read_text(encoding='utf-8')
     assert "create_service(Trigger, '~/throw'" in source
     given.launch_configurations['throw_after'] = '-1'
     assert len(module.record_and_throw(given)) == 1
@@ -272,18 +274,18 @@ def test_the_joint_turns_as_the_transform_does(urdf):
     assert numbers(joint.find('origin').get('xyz')) == [0.0, 0.0, 0.0]
     assert numbers(joint.find('origin').get('rpy')) == [0.0, 0.0, 0.0]
     state = Launch(spin=30.0).state()._replace(sigma=2.0)
-    angle, rate = conversions.spin_joint(state)
+    angle, rate = messages.spin_joint(state)
     assert rate == -30.0
     assert [math.sin(angle / 2) * x for x in axis] == [
         0.0,
         0.0,
-        pytest.approx(conversions.spin_transform(state)[0]),
+        pytest.approx(messages.spin_transform(state)[0]),
     ]
-    assert math.cos(angle / 2) == pytest.approx(conversions.spin_transform(state)[1])
+    assert math.cos(angle / 2) == pytest.approx(messages.spin_transform(state)[1])
 
 
 def test_mass_inertia_and_size_are_those_of_the_catalogue(urdf):
-    disc = catalogue.load('frisbee')
+    disc = disc_file.load_disc('frisbee')
     (inertial,) = urdf.iter('inertial')
     assert inertial.find('mass').get('value') == f'{disc.mass:g}'
     moments = {key: float(value) for key, value in inertial.find('inertia').items()}

@@ -1,0 +1,178 @@
+"""What can be checked and measured of a motion without knowing what moved it."""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from disc_sim_ros.analysis.flights import speeds, velocities
+from disc_sim_ros.analysis.odometry import Motion
+from disc_sim_ros.analysis.recording import NANOSECONDS
+from disc_sim_ros.arrays import FloatArray
+
+UNIT = 1e-3  # how far a quaternion may be from length 1; sim_node takes no worse in a throw
+FITTING = 0.05  # of the speed; by how much velocity may differ from the differences of position
+_SHORTEST = 1e-6  # length of a quaternion that tells an attitude
+_UNEVEN = 0.5  # of the usual distance of stamps; what is farther off is not even
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """How the stamps of a flight follow each other.
+
+    Attributes:
+        count: Messages.
+        rate: Messages a second [Hz], by the usual distance; 0 for one message.
+        longest: Longest distance [s].
+        missing: Messages that are missing where stamps are even.
+        repeated: Stamps that are the same as the one before.
+        backwards: Stamps that are before the one before.
+    """
+
+    count: int
+    rate: float
+    longest: float
+    missing: int
+    repeated: int
+    backwards: int
+
+    @property
+    def even(self) -> bool:
+        """Say whether each stamp follows the one before at the usual distance."""
+        return not (self.missing or self.repeated or self.backwards)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check of a motion: what, how much, and whether that is all right; None: not told."""
+
+    name: str
+    value: float
+    text: str
+    passed: bool
+
+
+def stamps_of(motion: Motion) -> Stamps:
+    """Return how the stamps of a motion follow each other."""
+    steps = np.diff(motion.stamps)
+    ahead = steps[steps > 0]
+    if not len(ahead):
+        return Stamps(len(motion), 0.0, 0.0, 0, int((steps == 0).sum()), int((steps < 0).sum()))
+    usual = float(np.median(ahead))
+    return Stamps(
+        count=len(motion),
+        rate=NANOSECONDS / usual,
+        longest=float(ahead.max()) / NANOSECONDS,
+        missing=int(np.maximum(np.rint(ahead / usual) - 1, 0).sum()),
+        repeated=int((steps == 0).sum()),
+        backwards=int((steps < 0).sum()),
+    )
+
+
+def checks(motion: Motion) -> list[Check]:
+    """Return what any motion must obey: stamps, unit quaternions, velocity against position."""
+    stamps = stamps_of(motion)
+    worst = float(np.abs(np.linalg.norm(motion.quaternion, axis=1) - 1.0).max())
+    found = [
+        Check(
+            'stamps',
+            float(stamps.backwards + stamps.repeated),
+            f'{stamps.backwards} go back, {stamps.repeated} repeat, {stamps.missing} are missing',
+            not (stamps.backwards or stamps.repeated),
+        ),
+        Check('quaternion_norm', worst, f'within {worst:.1e} of 1', worst <= UNIT),
+    ]
+    if motion.has_twist and len(motion) > 2:
+        found.append(_twist_check(motion))
+    return found
+
+
+def _twist_check(motion: Motion) -> Check:
+    """Compare velocities with differences of position, in the frame that fits better."""
+    t = (motion.stamps - motion.stamps[0]) / NANOSECONDS
+    dt = np.diff(t)
+    good = dt > 0.0
+    measured = np.diff(motion.position, axis=0)[good] / dt[good, None]
+    speed = float(np.median(np.linalg.norm(measured, axis=1))) if good.any() else 0.0
+    if not speed:
+        return Check('velocity', 0.0, 'nothing moves', passed=True)
+    misfit = {}
+    for frame, velocity in (
+        (motion.child or 'the body', rotate(motion)),
+        (motion.frame or 'the pose', motion.numbers[:, 7:10]),
+    ):
+        mean = 0.5 * (velocity[1:] + velocity[:-1])[good]
+        misfit[frame] = float(np.median(np.linalg.norm(mean - measured, axis=1))) / speed
+    own = motion.child or 'the body'
+    text = f'off the differences of position by {misfit[own]:.2%} of the speed (median)'
+    other = motion.frame or 'the pose'
+    if misfit[own] > FITTING >= misfit.get(other, math.inf):
+        text += f'; it is given in {other}, where it has {misfit[other]:.2%}'
+    return Check('velocity', misfit[own], text, misfit[own] <= FITTING)
+
+
+def rotate(motion: Motion) -> FloatArray:
+    """Return the velocities of Odometry in `frame` [m/s], shape (n, 3)."""
+    found: FloatArray = _rotation(motion).apply(motion.numbers[:, 7:10])
+    return found
+
+
+def with_twist(motion: Motion) -> Motion:
+    """Return a motion with a twist: its own, or one by differences of its poses.
+
+    Rates by differences are those of the frame itself; a body that turns by more than half a turn
+    between messages seems to turn by less.
+    """
+    if motion.has_twist:
+        return motion
+    rotation = _rotation(motion)
+    linear = rotation.apply(velocities(motion), inverse=True)
+    angular = np.zeros((len(motion), 3))
+    if len(motion) > 1:
+        dt = np.maximum(np.diff(motion.stamps), 1)[:, None] / NANOSECONDS
+        angular[:-1] = (rotation[:-1].inv() * rotation[1:]).as_rotvec() / dt
+        angular[-1] = angular[-2]
+    numbers = np.hstack([motion.numbers, linear, angular])
+    return Motion(motion.topic, motion.frame, motion.child, motion.stamps, motion.log, numbers)
+
+
+def ground_crossing(motion: Motion) -> tuple[float, FloatArray] | None:
+    """Return when z = 0 is last crossed from above [s after the first message], and where.
+
+    The place has shape (3,) [m]; it is interpolated between two messages. None where it is not.
+    """
+    z = motion.position[:, 2]
+    below = np.flatnonzero((z[:-1] > 0.0) & (z[1:] <= 0.0))
+    if not len(below):
+        return None
+    i = int(below[-1])
+    share = float(z[i] / (z[i] - z[i + 1]))
+    t = (motion.stamps[i : i + 2] - motion.stamps[0]) / NANOSECONDS
+    place = motion.position[i] + share * (motion.position[i + 1] - motion.position[i])
+    return float(t[0] + share * (t[1] - t[0])), place
+
+
+def turns_with_spin(motion: Motion) -> bool:
+    """Say whether the frame of a motion is fixed in what spins: its x axis goes round with it."""
+    if not motion.has_twist or len(motion) < 2:
+        return False
+    dt = float(np.median(np.diff(motion.stamps))) / NANOSECONDS
+    rate = float(np.median(motion.numbers[:, 12]))
+    if dt <= 0.0 or abs(rate * dt) > math.pi or abs(rate) < 1.0:
+        return False
+    rotation = _rotation(motion)
+    seen = float(np.median((rotation[:-1].inv() * rotation[1:]).as_rotvec()[:, 2])) / dt
+    return abs(seen - rate) < abs(seen)
+
+
+def greatest_speed(motion: Motion) -> float:
+    """Return the greatest speed [m/s]."""
+    return float(speeds(motion).max())
+
+
+def _rotation(motion: Motion) -> Rotation:
+    with np.errstate(over='ignore'):
+        norm = np.linalg.norm(motion.quaternion, axis=1, keepdims=True)
+    usable = (norm > _SHORTEST) & (norm < 1.0 / _SHORTEST)  # a damaged one may have any length
+    return Rotation.from_quat(np.where(usable, motion.quaternion, (0.0, 0.0, 0.0, 1.0)))

@@ -1,0 +1,173 @@
+"""A flight as a document for programs, a table for spreadsheets and a summary to read."""
+
+from dataclasses import asdict
+import math
+from typing import Any
+
+import numpy as np
+
+from disc_sim_ros import __version__
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.flight import Flight
+from disc_sim_ros.physics.theory import advance_ratio
+from disc_sim_ros.physics.trajectory import Trajectory
+
+
+def document(flight: Flight) -> dict[str, Any]:
+    """Return a flight as values that JSON knows; keys carry units, positions are in `map`.
+
+    `range_m` is the distance over the ground from the release to the end, `drift_m` how far left
+    of the launch heading it ended, `apex_m` the greatest height above the ground. The landing is
+    null for a flight that ended in the air. Sampled arrays come with the samples.
+    """
+    found: dict[str, Any] = {
+        'version': __version__,
+        'launch': launch_document(flight),
+        'landed': flight.landed,
+        'flight_time_s': flight.time,
+        'landing_position_m': flight.position.tolist() if flight.landed else None,
+        'end_position_m': flight.position.tolist(),
+        'range_m': flight.range,
+        'drift_m': flight.drift,
+        'apex_m': flight.apex,
+        'end_spin_rad_s': flight.end.r,
+    }
+    if len(flight.trajectory):
+        for name, values in columns(flight.trajectory).items():
+            found[name] = [_plain(value) for value in values.tolist()]
+    return found
+
+
+def launch_document(flight: Flight) -> dict[str, Any]:
+    """Return all that a repetition of the flight needs, with units in the keys."""
+    launch, setup, control = flight.launch, flight.setup, flight.control
+    return {
+        'disc': setup.disc.name,
+        'model': setup.model,
+        'aero': setup.aero or setup.disc.aero,
+        'moment_axes': setup.moment_axes,
+        'speed_m_s': launch.speed,
+        'pitch_deg': launch.pitch,
+        'roll_deg': launch.roll,
+        'yaw_deg': launch.yaw,
+        'angle_of_attack_deg': launch.angle_of_attack,
+        'sideslip_deg': launch.sideslip,
+        'spin_rad_s': launch.spin,
+        'roll_rate_rad_s': launch.roll_rate,
+        'pitch_rate_rad_s': launch.pitch_rate,
+        'height_m': launch.height,
+        'control': [control.C_L, control.C_M, control.C_N],
+        'wind_m_s': (frames.map_from_paper(setup.wind.mean) + 0.0).tolist(),
+        'wind': {k: v for k, v in asdict(setup.wind).items() if k != 'mean'},
+        'air_density_kg_m3': setup.air.density,
+        'gravity_m_s2': setup.air.gravity,
+        'step_s': setup.step,
+    }
+
+
+def columns(trajectory: Trajectory) -> dict[str, FloatArray]:
+    """Return the sampled quantities, each of shape (n,) or (n, 3), under names with units."""
+    euler = np.degrees(trajectory.euler)
+    return {
+        't_s': trajectory.t,
+        'position_m': frames.map_from_paper(trajectory.position) + 0.0,
+        'velocity_m_s': frames.map_from_paper(trajectory.velocity) + 0.0,
+        'airspeed_m_s': trajectory.airspeed,
+        'alpha_deg': np.degrees(trajectory.alpha),
+        'roll_deg': euler[:, 0],
+        'pitch_deg': euler[:, 1],
+        'yaw_deg': euler[:, 2],
+        'absolute_attitude_deg': np.degrees(trajectory.absolute_attitude),
+        'spin_rad_s': trajectory.spin,
+        'advance_ratio': trajectory.advance_ratio,
+    }
+
+
+def csv_text(trajectory: Trajectory) -> str:
+    """Return the samples as comma-separated text with one header line."""
+    names: list[str] = []
+    parts: list[FloatArray] = []
+    for name, values in columns(trajectory).items():
+        if values.ndim == 2:
+            quantity, unit = name.split('_', 1)
+            names += [f'{quantity}_{axis}_{unit}' for axis in 'xyz']
+        else:
+            names.append(name)
+        parts.append(values)
+    lines = [','.join(names)]
+    lines += [','.join(_cell(x) for x in row) for row in np.column_stack(parts).tolist()]
+    return '\n'.join(lines) + '\n'
+
+
+def summary(flight: Flight) -> str:
+    """Return a flight in a few lines to read."""
+    launch, setup = flight.launch, flight.setup
+    wind = frames.map_from_paper(setup.wind.mean) + 0.0
+    turns = 'clockwise' if launch.spin >= 0.0 else 'anticlockwise'
+    ratio = (
+        f', AdvR {advance_ratio(abs(launch.spin), setup.disc.diameter, launch.speed):.2f}'
+        if launch.speed > 0.0
+        else ''
+    )
+    lines = [
+        f'{setup.disc.name}: {setup.disc.description or "no description"}',
+        f'  model   {setup.model}, {setup.aero or setup.disc.aero} aerodynamics, '
+        f'moments in {setup.moment_axes} axes, RK4 step {setup.step * 1e3:g} ms',
+        f'  launch  {launch.speed:g} m/s, pitch {launch.pitch:g}, roll {launch.roll:g}, '
+        f'yaw {launch.yaw:g}, angle of attack {launch.angle_of_attack:g} degrees, '
+        f'{launch.height:g} m up',
+        f'  spin    {launch.spin:g} rad/s, {turns} from above{ratio}',
+    ]
+    if any((launch.sideslip, launch.roll_rate, launch.pitch_rate)):
+        lines.append(
+            f'  also    sideslip {launch.sideslip:g} degrees, roll rate {launch.roll_rate:g}, '
+            f'pitch rate {launch.pitch_rate:g} rad/s'
+        )
+    if np.any(wind != 0.0):
+        lines.append(f'  wind    {wind[0]:g} {wind[1]:g} {wind[2]:g} m/s (forward, left, up)')
+    if setup.wind.turbulence:
+        lines.append(f'  gusts   {setup.wind.turbulence:g} m/s at 6 m, seed {setup.wind.seed}')
+    control = flight.control
+    if any((control.C_L, control.C_M, control.C_N)):
+        lines.append(f'  control C_L {control.C_L:g}, C_M {control.C_M:g}, C_N {control.C_N:g}')
+    ended = 'landed ' if flight.landed else 'in the air'
+    lines += [
+        f'  {ended} after {flight.time:.3f} s at x {flight.position[0]:.2f} m, '
+        f'y {flight.position[1]:.2f} m, z {flight.position[2]:.2f} m',
+        *(['  (on the ground and not climbing: try --height 1)'] if flight.time == 0.0 else []),
+        f'  range   {flight.range:.2f} m, {sideways(flight.drift)}, apex {flight.apex:.2f} m',
+        f'  speed   {math.hypot(*flight.end[3:6]):.2f} m/s at the end'
+        + (f', {flight.end.r / launch.spin:.1%} of the spin left' if launch.spin else ''),
+    ]
+    return '\n'.join(lines)
+
+
+def samples_text(trajectory: Trajectory) -> str:
+    """Return the samples as an aligned table to read."""
+    found = columns(trajectory)
+    head = '     t s      x m      y m      z m   V m/s  alpha   roll  pitch lambda   spin  AdvR'
+    lines = [head]
+    position = found['position_m']
+    angles = ('alpha_deg', 'roll_deg', 'pitch_deg', 'absolute_attitude_deg')
+    for i, t in enumerate(trajectory.t):
+        x, y, z = position[i]
+        line = f'{t:8.3f} {x:8.3f} {y:8.3f} {z:8.3f} {found["airspeed_m_s"][i]:7.2f}'
+        line += ''.join(f' {found[name][i]:6.1f}' for name in angles)
+        line += f' {found["spin_rad_s"][i]:6.2f} {found["advance_ratio"][i]:5.2f}'
+        lines.append(line)
+    return '\n'.join(lines)
+
+
+def sideways(drift: float) -> str:
+    """Return how far left (positive) or right something ended, to read."""
+    return f'drift {abs(drift):.2f} m to the {"left" if drift >= 0.0 else "right"}'
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers that JSON does not know as null."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _cell(value: float) -> str:
+    return repr(value) if math.isfinite(value) else ''

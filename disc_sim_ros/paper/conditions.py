@@ -1,0 +1,161 @@
+"""What the figures have in common: the paper's disc, model and launches, and sampled curves.
+
+The text uses the constant spin rate model unless it says otherwise, so the figures do. Each flight
+is flown with the roll and pitch damping as printed and with a tenth of it, which meets Fig. 5 best
+(docs/deviations.md); moment coefficients act in axes 3.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+import csv
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+import io
+from typing import Any
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics import disc_file, theory
+from disc_sim_ros.physics.disc import Disc
+from disc_sim_ros.physics.environment import Air
+from disc_sim_ros.physics.flight import NO_CONTROL, Flight, Setup, fly
+from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.trajectory import Trajectory
+
+MODEL = 'constant_spin'
+PRINTED, TENTH, HUNDREDTH = 1.0, 0.1, 0.01  # share of the printed C_Lp and C_Mq
+SHARES = (PRINTED, TENTH)
+RATE = 100.0  # Hz, samples of a curve
+CONDITIONS = (
+    'Constant-spin model, moments in axes 3 (body); roll and pitch damping as printed '
+    'and 10 % of it.'
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One flight of a figure.
+
+    Attributes:
+        label: What sets it apart in its panel, with the unit.
+        share: Share of the printed roll and pitch damping.
+        flight: The flight, sampled at `RATE`.
+        value: The number that is varied, in the unit of the label; 0 where none is.
+    """
+
+    label: str
+    share: float
+    flight: Flight
+    value: float = 0.0
+
+    @property
+    def t(self) -> Trajectory:
+        """The samples."""
+        return self.flight.trajectory
+
+
+def percent(share: float) -> str:
+    """Return a share of the printed damping in words."""
+    return 'damping as printed' if share == PRINTED else f'{100 * share:g} % damping'
+
+
+@cache
+def frisbee(share: float = PRINTED) -> Disc:
+    """Return the paper's disc with a share of its printed roll and pitch damping."""
+    disc = disc_file.load_disc('frisbee')
+    return replace(disc, C_Lp=share * disc.C_Lp, C_Mq=share * disc.C_Mq)
+
+
+def spin_of(AdvR: float, speed: float) -> float:
+    """Return the spin of the paper's disc at an advance ratio [rad/s] (eqn 63)."""
+    return theory.spin_rate(AdvR, frisbee().diameter, speed)
+
+
+def level(AdvR: float, *, speed: float = 19.0, **angles: float) -> Launch:
+    """Return a launch of the paper's Fig. 6: 19 m/s, all angles 0 unless given [degrees]."""
+    return Launch(speed=speed, spin=spin_of(AdvR, speed), **{'pitch': 0.0, **angles})
+
+
+@cache
+def flown(
+    launch: Launch,
+    share: float = PRINTED,
+    *,
+    duration: float = 60.0,
+    ground: bool = False,
+    model: str = MODEL,
+    aero: str = 'table',
+    gravity: float = 9.81,
+    moment_axes: str = 'body',
+    control: Control = NO_CONTROL,
+    rate: float = RATE,
+) -> Flight:
+    """Fly the paper's disc; the same flight is flown once."""
+    setup = Setup(
+        disc=frisbee(share),
+        model=model,
+        aero=aero,
+        moment_axes=moment_axes,
+        air=Air(gravity=gravity),
+    )
+    return fly(launch, setup, control=control, duration=duration, ground=ground, sample_rate=rate)
+
+
+def read(name: str) -> dict[str, FloatArray]:
+    """Return the columns of a file of points read off the paper, of the folder data."""
+    text = (files('disc_sim_ros.paper') / 'data' / name).read_text(encoding='utf-8')
+    lines = [line for line in text.splitlines() if not line.startswith('#')]
+    rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
+    return dict(zip(lines[0].split(','), rows.T, strict=True))
+
+
+def quantities(t: Trajectory) -> dict[str, FloatArray]:
+    """Return what the paper plots of a flight, in its axes 1, under names with units."""
+    X, Y, Z = t.position.T
+    phi, theta, _ = np.degrees(t.euler).T
+    return {
+        't_s': t.t,
+        'X_forward_m': X,
+        'Y_right_m': Y,
+        'Z_down_m': Z,
+        'V_m_s': t.airspeed,
+        'alpha_deg': np.degrees(t.alpha),
+        'phi_deg': phi,
+        'theta_deg': theta,
+        'lambda_deg': np.degrees(t.absolute_attitude),
+        'AdvR': t.advance_ratio,
+        'spin_rad_s': t.spin,
+    }
+
+
+def csv_of_curves(curves: Iterable[Curve], paper: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return curves one below the other as CSV; `paper` adds points read off, by label."""
+    rows: list[list[Any]] = []
+    names: list[str] = []
+    for curve in curves:
+        found = quantities(curve.t)
+        names = list(found)
+        label = [curve.label, f'{curve.share:g}']
+        rows += [[*label, *row] for row in np.column_stack(list(found.values())).tolist()]
+    for label_of_points, points in paper.items():
+        for i in range(len(points['t_s'])):
+            cells = [points[name][i] if name in points else '' for name in names]
+            rows.append([label_of_points, '', *cells])
+    return csv_text(['curve', 'damping_share', *names], rows)
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Return a header and rows as CSV; numbers with 9 digits, what is not finite as nothing."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator='\n')
+    writer.writerow(header)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return buffer.getvalue()
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float | np.floating):
+        return f'{value + 0.0:.9g}' if np.isfinite(value) else ''
+    return str(value)

@@ -1,0 +1,133 @@
+"""Fig. 7: range over the launch pitch."""
+
+from dataclasses import dataclass
+import sys
+from typing import Any
+
+from matplotlib.figure import Figure
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.paper import conditions, figure_files, style
+from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.paper.fig06_launch_conditions import pitch_launch
+
+KEY = '7'
+TITLE = 'Fig. 7: range over launch pitch, 19 m/s, AdvR 1.1'
+CONDITIONS = conditions.CONDITIONS + ' Landing where the centre crosses Z = 0.'
+COARSE = 10.0  # degrees: ten points from 0 to 90
+FINE = 0.5  # degrees
+PAPER = 10.0  # degrees, of the greatest range
+
+
+@dataclass(frozen=True)
+class Data:
+    """Flights to the ground over the pitch, for each damping.
+
+    Attributes:
+        pitch: Launch pitch [degrees], shape (n,).
+        range: Distance over the ground, one row for each of `paper.SHARES` [m], shape (2, n).
+        duration: Time of flight, likewise [s], shape (2, n).
+        longest: One flight near the greatest range.
+    """
+
+    pitch: FloatArray
+    range: FloatArray
+    duration: FloatArray
+    longest: Curve
+
+    def best(self, values: FloatArray, spacing: float = FINE) -> float:
+        """Return the pitch of the largest of `values`, on a grid of a spacing [degrees]."""
+        on_grid = np.flatnonzero(np.isclose(self.pitch % spacing, 0.0))
+        return float(self.pitch[on_grid[np.argmax(values[on_grid])]])
+
+
+def compute() -> Data:
+    """Fly every half degree from 0 to 90."""
+    pitch = np.arange(0.0, 90.0 + FINE / 2, FINE)
+    flights = [
+        [conditions.flown(pitch_launch(float(x)), share, ground=True, rate=0.0) for x in pitch]
+        for share in conditions.SHARES
+    ]
+    return Data(
+        pitch,
+        np.array([[flight.range for flight in row] for row in flights]),
+        np.array([[flight.time for flight in row] for row in flights]),
+        Curve(
+            'θ 10°',
+            conditions.PRINTED,
+            conditions.flown(pitch_launch(10.0), conditions.PRINTED, ground=True),
+        ),
+    )
+
+
+@style.styled
+def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
+    """Draw range over pitch."""
+    return draw(data, data.range, 'range, m', stated=PAPER, words=(TITLE, CONDITIONS), look=look)
+
+
+def draw(
+    data: Data,
+    values: FloatArray,
+    label: str,
+    *,
+    stated: float,
+    words: tuple[str, str],
+    look: style.Look,
+) -> Figure:
+    """Draw one quantity over the pitch, with the best pitches and the paper's."""
+    figure = style.sheet(4.6, *words)
+    axis = figure.add_subplot()
+    lines: tuple[dict[str, Any], ...] = (
+        {'color': look.printed},
+        {'color': look.tenth, 'ls': (0, (4, 1.6))},
+    )
+    for row, line, share in zip(values, lines, conditions.SHARES, strict=True):
+        best = data.best(row)
+        name = f'{conditions.percent(share)}: most at {best:g}°'
+        axis.plot(data.pitch, row, label=name, **line)
+    coarse = np.isclose(data.pitch % COARSE, 0.0)
+    best = data.best(values[0], COARSE)
+    name = f'ten points, as printed: most at {best:g}°'
+    axis.plot(data.pitch[coarse], values[0][coarse], 'o', color=look.printed, label=name)
+    name = f'paper: most near {stated:g}°'
+    axis.axvline(stated, color=look.ink, ls=':', lw=1.4, label=name)
+    axis.set(xlabel='launch pitch θ, °', ylabel=label, xlim=(0, 90), ylim=(0, None))
+    axis.legend(loc='best')
+    return figure
+
+
+def findings(data: Data) -> list[str]:
+    """Say where the range is greatest."""
+    return [
+        f'{conditions.percent(share)}: greatest range {row.max():.1f} m at {data.best(row):g}°; '
+        f'of ten points 10° apart at {data.best(row, COARSE):g}°.'
+        for share, row in zip(conditions.SHARES, data.range, strict=True)
+    ] + ['At 0° the lift is less than the weight, the disc sinks at once and has no range.']
+
+
+def table(data: Data) -> str:
+    """Return range and duration over pitch as CSV."""
+    names = ['pitch_deg']
+    names += [
+        f'{what}_damping_{s:g}' for s in conditions.SHARES for what in ('range_m', 'duration_s')
+    ]
+    columns = [data.pitch]
+    for far, long in zip(data.range, data.duration, strict=True):
+        columns += [far, long]
+    return conditions.csv_text(names, np.column_stack(columns))
+
+
+def example(data: Data) -> Curve:
+    """Return the flight that is integrated a second time, independently."""
+    return data.longest
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write this figure alone."""
+    return figure_files.main(sys.modules[__name__], arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,186 @@
+"""Fig. 10: dimensionless trajectories of flat plates of equal k_n / AdvR fall together.
+
+The plate is `flat_plate` of the catalogue, with the printed 0.06 m for a radius
+(docs/deviations.md). Which speeds, masses and ratios were drawn is not printed.
+"""
+
+from dataclasses import dataclass, replace
+import math
+import sys
+
+from matplotlib.figure import Figure
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.paper import conditions, figure_files, style
+from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.physics import disc_file, theory
+from disc_sim_ros.physics.disc import Disc
+from disc_sim_ros.physics.flight import Flight, Setup, fly
+from disc_sim_ros.physics.launch import Launch
+
+KEY = '10'
+TITLE = 'Fig. 10: dimensionless flights of flat plates'
+CONDITIONS = (
+    'Constant-spin model, linear aerodynamics, moments in axes 3 (body); the paper gives the '
+    'plate no damping.\nDiscs every 0.1 s, enlarged 4 times. Lengths times g / V².'
+)
+SPEED, ALPHA = 15.7, 2.0  # m/s and degrees at launch
+GRAVITY = 9.81  # m/s^2
+LONGEST = 1.5  # dimensionless time t g / V
+MASS_FACTORS = (0.5, 1.0, 2.0, 4.0)  # first row: speed times their roots, so that lift = weight
+RATIOS = (0.5, 1.0, 2.0, 3.5)  # second row
+P_HAT_SECOND = 0.47  # of the second row, caption, by eqn 64 as printed
+
+
+@dataclass(frozen=True)
+class Data:
+    """Flights of both rows; lengths are made dimensionless with the launch speed of each."""
+
+    first: tuple[Curve, ...]
+    second: tuple[Curve, ...]
+
+
+def plate(mass_factor: float = 1.0, CM_alpha: float | None = None) -> Disc:
+    """Return the flat plate, heavier by a factor or with another moment slope."""
+    disc = disc_file.load_disc('flat_plate')
+    if disc.linear is None:
+        raise ValueError('the flat plate has straight lines')
+    line = disc.linear if CM_alpha is None else replace(disc.linear, CM_alpha=CM_alpha)
+    return replace(
+        disc,
+        mass=mass_factor * disc.mass,
+        inertia_axial=mass_factor * disc.inertia_axial,
+        inertia_diametral=mass_factor * disc.inertia_diametral,
+        linear=line,
+    )
+
+
+def launched(disc: Disc, speed: float, ratio: float) -> Flight:
+    """Fly a plate, itself level, released at 2 degrees of angle of attack (caption)."""
+    spin = theory.spin_rate(ratio, disc.diameter, speed)
+    launch = Launch(speed=speed, pitch=0.0, angle_of_attack=ALPHA, spin=spin)
+    samples = 150
+    duration = LONGEST * speed / GRAVITY
+    return fly(
+        launch,
+        Setup(disc=disc, model=conditions.MODEL),
+        duration=duration,
+        ground=False,
+        sample_rate=samples / duration,
+    )
+
+
+def moment_slope(ratio: float) -> float:
+    """Return the C_M slope at which eqn 64 as printed gives `P_HAT_SECOND` [1/rad]."""
+    line = plate().linear
+    return P_HAT_SECOND / 8.0 * ratio * (line.CL_alpha if line else math.nan)
+
+
+def compute() -> Data:
+    """Fly both rows."""
+    first = tuple(
+        Curve(
+            f'{SPEED * math.sqrt(factor):.1f} m/s, {1e3 * 0.015 * factor:g} g',
+            0.0,
+            launched(plate(factor), SPEED * math.sqrt(factor), 1.0),
+            SPEED * math.sqrt(factor),
+        )
+        for factor in MASS_FACTORS
+    )
+    second = tuple(
+        Curve(
+            f'AdvR {ratio:g}, C_Mα {moment_slope(ratio):.3f}',
+            0.0,
+            launched(plate(CM_alpha=moment_slope(ratio)), SPEED, ratio),
+            ratio,
+        )
+        for ratio in RATIOS
+    )
+    return Data(first, second)
+
+
+def dimensionless(curve: Curve) -> FloatArray:
+    """Return positions times g / V^2 at equal dimensionless times, shape (n, 3)."""
+    return theory.dimensionless_length(curve.t.position, curve.flight.launch.speed, GRAVITY)
+
+
+def spread(curves: tuple[Curve, ...]) -> float:
+    """Return the largest distance between two flights at one time, by the way flown [1]."""
+    paths = np.array([dimensionless(curve) for curve in curves])
+    apart = np.linalg.norm(paths[:, None] - paths[None, :], axis=-1).max()
+    way = np.linalg.norm(np.diff(paths[0], axis=0), axis=1).sum()
+    return float(apart / way)
+
+
+def law(curve: Curve, *, printed: bool) -> float:
+    """Return the dimensionless roll rate of eqn 64, as printed or corrected."""
+    rule = theory.printed_roll_rate_law if printed else theory.roll_rate_law
+    disc, launch = curve.flight.setup.disc, curve.flight.launch
+    ratio = theory.advance_ratio(launch.spin, disc.diameter, launch.speed)
+    return float(rule(theory.static_margin(disc), ratio))
+
+
+@style.styled
+def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
+    """Draw both views of both rows."""
+    figure = style.sheet(6.6, TITLE, CONDITIONS)
+    grid = figure.add_gridspec(2, 2)
+    for row, curves in enumerate((data.first, data.second)):
+        colours = style.family([curve.value for curve in curves], look)
+        for column, side in enumerate((style.SIDE, style.TOP)):
+            axis = figure.add_subplot(grid[row, column])
+            for i, (curve, colour) in enumerate(zip(curves, colours, strict=True)):
+                scale = GRAVITY / curve.flight.launch.speed**2
+                line = {'color': colour, 'label': curve.label, 'ls': ('-', '--', '-.', ':')[i]}
+                style.path(axis, curve.t, side, scale=scale, **line)
+                style.discs(axis, curve.t, side, every=0.1, size=4.0, colour=colour, scale=scale)
+            style.views(axis, side)
+            axis.set_xlabel('X g / V²')
+            axis.set_ylabel('−Z g / V²' if side == style.SIDE else 'Y g / V² (right)')
+            what = ('speed and mass vary', 'AdvR and C_Mα vary')[row]
+            style.letter(axis, 'ab'[row], what if column == 0 else 'from above')
+            if column == 1:
+                axis.legend(loc='center left', bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def findings(data: Data) -> list[str]:
+    """Say how well each row falls together."""
+    lines = []
+    for name, curves in (('First', data.first), ('Second', data.second)):
+        lines.append(
+            f'{name} row: eqn 64 gives {law(curves[1], printed=True):.2f} as printed, '
+            f'{law(curves[1], printed=False):.2f} corrected; the flights are at most '
+            f'{100 * spread(curves):.2g} % of their length apart.'
+        )
+    return lines
+
+
+def table(data: Data) -> str:
+    """Return the dimensionless positions as CSV."""
+    rows = []
+    for row, curves in (('first', data.first), ('second', data.second)):
+        for curve in curves:
+            speed = curve.flight.launch.speed
+            t_hat = theory.dimensionless_time(curve.t.t, speed, GRAVITY)
+            rows += [
+                [row, curve.label, t, t_hat[i], *xyz]
+                for i, (t, xyz) in enumerate(zip(curve.t.t, dimensionless(curve), strict=True))
+            ]
+    header = ['row', 'curve', 't_s', 'time_g_by_V', 'X_g_by_V2', 'Y_right_g_by_V2']
+    return conditions.csv_text([*header, 'Z_down_g_by_V2'], rows)
+
+
+def example(data: Data) -> Curve:
+    """Return the flight that is integrated a second time, independently."""
+    return data.second[0]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write this figure alone."""
+    return figure_files.main(sys.modules[__name__], arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,76 @@
+"""All statements, judged, and the table as text."""
+
+from dataclasses import replace
+
+from disc_sim_ros.paper import conditions
+from disc_sim_ros.paper.statements import control, launches, theory, typical
+from disc_sim_ros.paper.statements.rule import (
+    DIFFERS,
+    NOT_REPRODUCIBLE,
+    REPRODUCED,
+    TAKEN,
+    Result,
+    Statement,
+    judge,
+)
+
+STATEMENTS: tuple[Statement, ...] = (
+    *theory.STATEMENTS,
+    *typical.STATEMENTS,
+    *launches.STATEMENTS,
+    *control.STATEMENTS,
+)
+HEADER = ('where', 'what', 'paper', 'ours, damping as printed', 'ours, 10 % damping', 'tolerance',
+          'verdict', 'how much, why')  # fmt: skip
+
+
+def evaluate() -> tuple[Result, ...]:
+    """Judge all statements; the results can go to another process, without the functions."""
+    results = (judge(statement) for statement in STATEMENTS)
+    return tuple(
+        replace(result, statement=replace(result.statement, ours=None, upper=None))
+        for result in results
+    )
+
+
+def tally(results: tuple[Result, ...]) -> dict[str, int]:
+    """Return how many statements got each verdict."""
+    words = (REPRODUCED, DIFFERS, NOT_REPRODUCIBLE, TAKEN)
+    return {word: sum(result.verdict == word for result in results) for word in words}
+
+
+def met_by_damping(results: tuple[Result, ...]) -> tuple[int, int, int]:
+    """Return how many numbers depend on damping, and how many each damping meets."""
+    judged = [result.met for result in results if result.met]
+    return len(judged), sum(met[0] for met in judged), sum(met[1] for met in judged)
+
+
+def cells(result: Result) -> tuple[str, ...]:
+    """Return one row of the table, below `HEADER`."""
+    statement = result.statement
+    about = 'about ' if statement.about else ''
+    if statement.words:
+        about = f'{statement.words}; read as '
+    unit = statement.unit if statement.unit == '°' else f' {statement.unit}'
+    ours = result.ours or ('-', '-')
+    if len(ours) == 1:
+        ours = (ours[0], 'the same')
+    allowed = '-'
+    if result.ours and statement.number[0] not in '<>':
+        allowed = f'±{statement.allowed:.3g}'
+        if statement.reason:
+            allowed += f' ({statement.reason})'
+    return (
+        statement.where,
+        statement.says,
+        f'{about}{statement.number}{unit}'.strip() if statement.number else statement.words,
+        *ours,
+        allowed,
+        result.verdict,
+        result.detail,
+    )
+
+
+def csv(results: tuple[Result, ...]) -> str:
+    """Return the table as CSV."""
+    return conditions.csv_text(HEADER, [cells(result) for result in results])

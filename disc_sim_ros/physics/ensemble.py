@@ -1,0 +1,324 @@
+"""Many flights at once: those of `flight.fly`, side by side in vector registers, on all cores."""
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+import math
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from disc_sim_ros import validation
+from disc_sim_ros.arrays import FloatArray, IntArray
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics import flight, frames
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.kernels.batch import fly_lanes
+from disc_sim_ros.physics.kernels.batch_rows import AT, NAMES, fly_rows
+from disc_sim_ros.physics.kernels.equations import Control, State
+from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, STATE_SIZE
+from disc_sim_ros.physics.kernels.jit import COMPILED, is_compiled
+from disc_sim_ros.physics.kernels.rk4 import STABLE
+from disc_sim_ros.physics.kernels.simd import WIDTH
+from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS
+from disc_sim_ros.physics.launch import LIMITS, Launch
+
+# What may differ from flight to flight besides the fields of Launch: least, greatest, unit.
+OTHER_LIMITS = {
+    'wind_x': (-100.0, 100.0, 'm/s'),  # where the air moves to, in `map`
+    'wind_y': (-100.0, 100.0, 'm/s'),
+    'wind_z': (-100.0, 100.0, 'm/s'),
+    'control_CL': (-10.0, 10.0, ''),  # held, the paper's signs
+    'control_CM': (-10.0, 10.0, ''),
+    'control_CN': (-10.0, 10.0, ''),
+    'mass': (1e-3, 100.0, 'kg'),
+    'inertia_axial': (1e-7, 100.0, 'kg m^2'),
+    'inertia_diametral': (1e-7, 100.0, 'kg m^2'),
+    'C_Lp': (-100.0, 0.0, ''),
+    'C_Mq': (-100.0, 0.0, ''),
+    'C_Nr': (-100.0, 0.0, ''),
+    'air_density': (0.0, 100.0, 'kg/m^3'),
+    'gravity': (0.0, 100.0, 'm/s^2'),
+    'lift_factor': (0.0, 10.0, ''),  # times the disc's own coefficients
+    'drag_factor': (0.0, 10.0, ''),
+    'pitching_factor': (0.0, 10.0, ''),
+    'lift_offset': (-2.0, 2.0, ''),  # added to them afterwards
+    'drag_offset': (-2.0, 2.0, ''),
+    'pitching_offset': (-2.0, 2.0, ''),
+}
+ALL_LIMITS = LIMITS | OTHER_LIMITS
+
+# Flights that a thread takes at a time: for 0.1 s or so, so that Ctrl-C is heard.
+_CHUNK = 2e6  # steps
+_USUAL_FLIGHT = 10.0  # s; most are shorter
+_LONGEST_CHUNK = 4096  # flights
+_FIRST_GUSTS = 500  # rows of noise drawn at first, for 5 s; most flights have landed by then
+
+
+@dataclass(frozen=True, slots=True)
+class Landings:
+    """How the flights of an ensemble ended; positions in `map`.
+
+    Attributes:
+        status: LANDED, FLYING (time was up) or LOST (the step could not follow: the state is the
+            last sound one), shape (n,).
+        time: Time of flight [s], shape (n,).
+        apex: Greatest height above the ground [m], shape (n,).
+        drift: How far left of its launch heading each ended [m], shape (n,).
+        states: States at the end in the paper's axes, columns as in State, shape (n, 14).
+    """
+
+    status: IntArray
+    time: FloatArray
+    apex: FloatArray
+    drift: FloatArray
+    states: FloatArray
+
+    @property
+    def x(self) -> FloatArray:
+        """Return how far forward each ended [m]."""
+        return self.states[:, 0]
+
+    @property
+    def y(self) -> FloatArray:
+        """Return how far left each ended [m]."""
+        return 0.0 - self.states[:, 1]
+
+    @property
+    def z(self) -> FloatArray:
+        """Return how high each ended [m]; 0 where it landed."""
+        return np.where(self.status == LANDED, 0.0, 0.0 - self.states[:, 2])
+
+    @property
+    def range(self) -> FloatArray:
+        """Return the distance over the ground from the release [m]."""
+        return np.hypot(self.states[:, 0], self.states[:, 1])
+
+    @property
+    def end_speed(self) -> FloatArray:
+        """Return the speed over the ground at the end [m/s]."""
+        speeds: FloatArray = np.sqrt(np.sum(self.states[:, 3:6] ** 2, axis=1))
+        return speeds
+
+    @property
+    def end_spin(self) -> FloatArray:
+        """Return the spin at the end [rad/s], clockwise from above positive."""
+        return self.states[:, State._fields.index('r')]
+
+
+def fly_many(
+    launches: Mapping[str, ArrayLike],
+    setup: Setup,
+    *,
+    control: Control = flight.NO_CONTROL,
+    seeds: ArrayLike | None = None,
+    duration: float = 60.0,
+    ground: bool = True,
+    threads: int | None = None,
+) -> Landings:
+    """Fly many discs, each as `flight.fly` would.
+
+    Args:
+        launches: What differs by name, as in NAMES: fields of Launch, components of the mean wind
+            in `map`, control coefficients, properties of the disc and of the air. Each is a
+            number or an array of shape (n,); what is not named is that of a default Launch, of
+            `setup` and of `control`.
+        setup: The disc, the model, the air, the wind and the step of all.
+        control: Control inputs of all, held for the whole flight.
+        seeds: Seeds of the gusts, shape (n,); all fly in those of `setup` otherwise.
+        duration: Longest time of flight [s].
+        ground: End where the centre crosses z = 0 from above; else fly for `duration`.
+        threads: Number of threads; None for one a core.
+
+    Returns:
+        The ends of the flights, in their order; they do not depend on `threads`.
+
+    Raises:
+        ConfigError: A name is unknown, shapes differ, a value is out of range or a step too long
+            for a flight; it names the first such flight.
+    """
+    validation.number('duration', duration, above=0.0, highest=flight.LONGEST, unit='s')
+    control = flight.checked_control(control)
+    columns = _checked_columns(launches, setup, control, ground=ground)
+    n = max((x.size for x in columns.values() if x.ndim), default=1)
+    found = Landings(
+        np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty((n, STATE_SIZE))
+    )
+    gusts = None
+    seconds = min(duration, _USUAL_FLIGHT) if ground else duration
+    chunk = round(min(max(_CHUNK * setup.step / seconds, WIDTH), _LONGEST_CHUNK))
+    if setup.wind.turbulence > 0.0:
+        gusts = _seeds(setup.wind.seed if seeds is None else seeds, n)
+        chunk = max(chunk // 16, 1)
+    fixed = _Fixed(setup, control, float(duration), ground, found)
+
+    def work(start: int) -> None:
+        rows = _rows(columns, start, min(start + chunk, n))
+        if gusts is None:
+            fixed.fly(rows, start, flight.NO_NOISE)
+            return
+        for i, row in enumerate(rows, start):
+            fixed.fly_in_gusts(row[np.newaxis], i, int(gusts[i]))
+
+    starts = range(0, n, chunk)
+    workers = min(threads or os.cpu_count() or 1, len(starts))
+    if workers <= 1:
+        for start in starts:
+            work(start)
+        return found
+    pool = ThreadPoolExecutor(workers)
+    try:
+        futures: list[Future[None]] = [pool.submit(work, start) for start in starts]
+        for future in futures:
+            future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return found
+
+
+def is_ready(setup: Setup) -> bool:
+    """Say whether `fly_many` needs no compilation first: gusts have a kernel of their own."""
+    return is_compiled(_kernel(gusts=setup.wind.turbulence > 0.0))
+
+
+def _kernel(*, gusts: bool) -> Callable[..., None]:
+    """Return what flies: side by side, but one by one in gusts and in plain Python."""
+    return fly_lanes if COMPILED and not gusts else fly_rows
+
+
+@dataclass(frozen=True)
+class _Fixed:
+    """What all flights of an ensemble share."""
+
+    setup: Setup
+    control: Control
+    duration: float
+    ground: bool
+    found: Landings
+
+    def fly(self, rows: FloatArray, start: int, noise: FloatArray) -> None:
+        """Fly all rows, the first of which is flight `start`: side by side if without gusts."""
+        setup, found = self.setup, self.found
+        _kernel(gusts=len(noise) > 0)(
+            rows,
+            start,
+            setup.plant,
+            setup.disc.table_rows,
+            setup.disc.spin_terms,
+            self.control,
+            setup.wind_data,
+            noise,
+            float(setup.step),
+            self.duration,
+            self.ground,
+            found.status,
+            found.time,
+            found.apex,
+            found.drift,
+            found.states,
+        )
+
+    def fly_in_gusts(self, row: FloatArray, i: int, seed: int) -> None:
+        """Fly one; draw more of the same numbers where it is in the air for long."""
+        needed = math.ceil(self.duration / GUST_INTERVAL) + 3
+        for count in (min(_FIRST_GUSTS, needed), min(4 * _FIRST_GUSTS, needed), needed):
+            generator = np.random.Generator(np.random.Philox(seed))
+            noise = generator.standard_normal((count, NOISE_COLUMNS))
+            duration = min(self.duration, (count - 3) * GUST_INTERVAL)
+            replace(self, duration=duration).fly(row, i, noise)
+            if self.found.status[i] != FLYING or count == needed:
+                return
+
+
+def _checked_columns(
+    launches: Mapping[str, ArrayLike], setup: Setup, control: Control, *, ground: bool
+) -> dict[str, FloatArray]:
+    """Return all of NAMES, checked: what is given, of shape (n,) or (), and what is not."""
+    columns = {name: np.array(x) for name, x in _defaults(setup, control).items()}
+    for name, values in launches.items():
+        validation.choice('launches', name, NAMES)
+        try:
+            columns[name] = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise ConfigError(name, values, 'give numbers') from None
+    n = max((x.size for x in columns.values() if x.ndim), default=1)
+    for name, x in columns.items():
+        if x.ndim > 1 or (x.ndim == 1 and x.size != n):
+            raise ConfigError(name, x.shape, f'give a number or an array of shape ({n},)')
+    for name in launches:
+        lowest, highest, unit = ALL_LIMITS[name]
+        x = columns[name]
+        allowed = f'give a number from {lowest:g} to {highest:g} {unit}'.rstrip()
+        _refuse(name, x, (x >= lowest) & (x <= highest), allowed)
+    if ground:
+        _refuse('height', columns['height'], columns['height'] >= 0.0, 'release at 0 m or above')
+    axial, most = columns['inertia_axial'], 2.0 * columns['inertia_diametral']
+    axial = np.broadcast_to(axial, np.broadcast_shapes(axial.shape, most.shape))
+    _refuse('inertia_axial', axial, axial <= most * (1 + 1e-9), 'at most twice inertia_diametral')
+    for start in range(0, n, _LONGEST_CHUNK):
+        _refuse_long_steps(_rows(columns, start, min(start + _LONGEST_CHUNK, n)), start, setup)
+    return columns
+
+
+def _rows(columns: dict[str, FloatArray], start: int, stop: int) -> FloatArray:
+    """Return the columns of some flights as the compiled loop takes them, (n, len(NAMES))."""
+    rows = np.empty((stop - start, len(NAMES)))
+    for j, name in enumerate(NAMES):
+        x = columns[name]
+        rows[:, j] = x[start:stop] if x.ndim else x
+    return rows
+
+
+def _refuse(name: str, values: FloatArray, good: NDArray[np.bool_], allowed: str) -> None:
+    if not good.all():
+        i = int(np.argmin(good))
+        raise ConfigError(f'{name} of flight {i}', float(values.flat[i]), allowed)
+
+
+def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
+    """Refuse a step that RK4 cannot follow in some flight, as `Setup.check_step` does for one."""
+    if setup.model == 'precession':
+        return
+    of = {name: rows[:, j] for name, j in AT.items()}
+    spin = of['spin']
+    V = of['speed'] + np.sqrt(of['wind_x'] ** 2 + of['wind_y'] ** 2 + of['wind_z'] ** 2)
+    arrays: dict[str, Any] = {
+        'I_x': of['inertia_diametral'],
+        'I_z': of['inertia_axial'],
+        'rho': of['air_density'],
+    }
+    plant = setup.plant._replace(C_Lp=-1.0, C_Mq=-1.0, **arrays)
+    steepest = setup.disc.steepest_moment(setup.aero or setup.disc.aero)
+    nutation, damping, pitching = flight.rates(spin, V, plant, steepest)
+    damping = damping * np.maximum(-of['C_Lp'], -of['C_Mq'])
+    pitching = pitching * np.sqrt(of['pitching_factor'])
+    fastest = np.maximum.reduce([nutation, damping, pitching])
+    good = setup.step * fastest <= STABLE
+    if not good.all():
+        i = int(np.argmin(good))
+        allowed = (
+            f'flight {start + i}, at spin {spin[i]:g} rad/s and {V[i]:g} m/s through the air, '
+            f'needs at most {STABLE / fastest[i]:.3g} s'
+        )
+        raise ConfigError('step', setup.step, allowed)
+
+
+def _defaults(setup: Setup, control: Control) -> dict[str, float]:
+    """Return what each of NAMES is where it is not given."""
+    release = Launch()
+    wind = (frames.map_from_paper(setup.wind.mean) + 0.0).tolist()
+    plant = setup.plant
+    other = [*wind, control.C_L, control.C_M, control.C_N]
+    other += [plant.m, plant.I_z, plant.I_x, plant.C_Lp, plant.C_Mq, plant.C_Nr, plant.rho]
+    other += [plant.g, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    values = [*(getattr(release, name) for name in LIMITS), *other]
+    return dict(zip(NAMES, values, strict=True))
+
+
+def _seeds(seeds: ArrayLike, n: int) -> IntArray:
+    found = np.asarray(seeds)
+    if found.dtype.kind not in 'iu' or found.shape not in {(), (n,)} or (found < 0).any():
+        raise ConfigError('seeds', seeds, f'give whole numbers from 0, one or {n} of them')
+    return np.broadcast_to(found.astype(np.int64), (n,))

@@ -1,0 +1,308 @@
+"""One flight from release to landing, without ROS: the function that everything offline uses."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+import math
+from typing import Any
+
+import numpy as np
+
+from disc_sim_ros import validation
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import ConfigError, IntegrationError
+from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.disc import AERODYNAMICS, Disc
+from disc_sim_ros.physics.environment import Air, Wind
+from disc_sim_ros.physics.kernels import integrator, rotation
+from disc_sim_ros.physics.kernels.aerodynamics import Linear
+from disc_sim_ros.physics.kernels.equations import (
+    BODY,
+    CONSTANT_SPIN,
+    EXACT,
+    PRECESSION,
+    WIND,
+    Control,
+    Plant,
+    State,
+)
+from disc_sim_ros.physics.kernels.jit import is_compiled
+from disc_sim_ros.physics.kernels.rk4 import STABLE
+from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, WindData
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
+
+MODELS = {'exact': EXACT, 'constant_spin': CONSTANT_SPIN, 'precession': PRECESSION}
+MOMENT_AXES = {'body': BODY, 'wind': WIND}
+NO_CONTROL = Control()
+LONGEST = 3600.0  # s
+MOST_SAMPLES = 5_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What flies, in what and how it is computed.
+
+    Attributes:
+        disc: The disc.
+        model: Rigid-body model: 'exact', 'constant_spin' or 'precession'.
+        aero: Steady coefficients: 'table' or 'linear'; None for the disc's own.
+        moment_axes: Axes in which moment coefficients act: 'body' (axes 3) or 'wind' (axes 4).
+        air: Density and gravity.
+        wind: Wind and turbulence.
+        step: Integration step [s].
+
+    Raises:
+        ConfigError: An unknown word, or aerodynamics that the disc does not hold.
+    """
+
+    disc: Disc
+    model: str = 'exact'
+    aero: str | None = None
+    moment_axes: str = 'body'
+    air: Air = field(default_factory=Air)
+    wind: Wind = field(default_factory=Wind)
+    step: float = 1e-3
+
+    def __post_init__(self) -> None:
+        validation.choice('model', self.model, MODELS)
+        validation.choice('moment_axes', self.moment_axes, MOMENT_AXES)
+        validation.number('step', self.step, 1e-6, 0.1, unit='s')
+        if self.aero is not None:
+            validation.choice('aero', self.aero, AERODYNAMICS)
+            if not self.disc.has(self.aero):
+                allowed = f'disc {self.disc.name} holds no such coefficients'
+                raise ConfigError('aero', self.aero, allowed)
+
+    @cached_property
+    def plant(self) -> Plant:
+        """Return the constants as the compiled equations take them."""
+        disc = self.disc
+        return Plant(
+            m=float(disc.mass),
+            c=float(disc.diameter),
+            S=float(disc.area),
+            I_x=float(disc.inertia_diametral),
+            I_z=float(disc.inertia_axial),
+            C_Lp=float(disc.C_Lp),
+            C_Mq=float(disc.C_Mq),
+            C_Nr=float(disc.C_Nr),
+            rho=float(self.air.density),
+            g=float(self.air.gravity),
+            model=MODELS[self.model],
+            moment_axes=MOMENT_AXES[self.moment_axes],
+            use_linear=(self.aero or disc.aero) == 'linear',
+            line=_line(disc),
+        )
+
+    def check_step(self, spin: float, speed: float) -> None:
+        """Refuse a step that is too long for what the disc does at release.
+
+        Args:
+            spin: Spin rate [rad/s].
+            speed: Speed over the ground [m/s].
+
+        Raises:
+            ConfigError: RK4 would blow up, so that the flight would mean nothing.
+        """
+        if self.model == 'precession':  # p and q follow the moments at once
+            return
+        V = speed + math.hypot(*self.wind.mean)
+        steepest = self.disc.steepest_moment(self.aero or self.disc.aero)
+        fastest = max(rates(spin, V, self.plant, steepest))
+        if self.step * fastest > STABLE:
+            allowed = (
+                f'at spin {spin:g} rad/s and {V:g} m/s through the air RK4 needs at most '
+                f'{STABLE / fastest:.3g} s'
+            )
+            raise ConfigError('step', self.step, allowed)
+
+    @cached_property
+    def wind_data(self) -> WindData:
+        """Return the wind as the compiled equations take it."""
+        wind = self.wind
+        X, Y, Z = (float(component) for component in wind.mean)
+        z0 = float(wind.roughness_length)
+        per_log = 1.0 / math.log(wind.reference_height / z0) if z0 > 0.0 else 0.0
+        horizontal = math.hypot(X, Y)
+        x_X, x_Y = (X / horizontal, Y / horizontal) if horizontal > 0.0 else (1.0, 0.0)
+        return WindData(X, Y, Z, z0, per_log, float(wind.turbulence), x_X, x_Y)
+
+    def noise(self, duration: float) -> FloatArray:
+        """Return the normal numbers that draw the gusts of a flight; none without turbulence."""
+        if self.wind.turbulence == 0.0:
+            return NO_NOISE
+        rows = math.ceil(duration / GUST_INTERVAL) + 3
+        generator = np.random.Generator(np.random.Philox(int(self.wind.seed)))
+        return generator.standard_normal((rows, NOISE_COLUMNS))
+
+
+def rates(spin: Any, V: Any, plant: Plant, steepest: float) -> tuple[Any, Any, Any]:
+    """Return the rates of nutation, damping and pitching of a disc [1/s], for floats or arrays.
+
+    Args:
+        spin: Spin rate [rad/s].
+        V: Airspeed [m/s].
+        plant: Constants of the flight; any of them may be arrays as well.
+        steepest: Largest slope of C_M over the angle of attack, positive [1/rad].
+    """
+    nutation = abs(spin) * plant.I_z / plant.I_x
+    rhoVSc_I = plant.rho * V * plant.S * plant.c / plant.I_x
+    damping = 0.25 * rhoVSc_I * plant.c * max(-plant.C_Lp, -plant.C_Mq)
+    pitching = (0.5 * rhoVSc_I * V * steepest) ** 0.5
+    return nutation, damping, pitching
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A flight that has ended; `position`, `drift` and `apex` are for people, in `map` axes.
+
+    Attributes:
+        landed: Whether it reached the ground; otherwise its time was up in the air.
+        time: Time of flight [s].
+        end: State at the landing, or at the end of the time.
+        apex: Greatest height above the ground [m].
+        trajectory: Evenly timed samples, without the landing; empty unless asked for.
+    """
+
+    launch: Launch
+    setup: Setup
+    control: Control
+    landed: bool
+    time: float
+    end: State
+    apex: float
+    trajectory: Trajectory
+
+    @property
+    def position(self) -> FloatArray:
+        """Return where it ended, in `map` axes, shape (3,) [m]; a landing has z = 0."""
+        x, y, z = frames.map_from_paper(self.end[:3])
+        return np.array([x, y, 0.0 if self.landed else z]) + 0.0  # no minus zeros
+
+    @property
+    def range(self) -> float:
+        """Return the distance over the ground from the release to the end [m]."""
+        return math.hypot(self.end.X, self.end.Y)
+
+    @property
+    def drift(self) -> float:
+        """Return how far left of the launch heading it ended [m]; negative is to the right."""
+        c, s = rotation.cos_sin_degrees(self.launch.yaw)
+        return s * self.end.X - c * self.end.Y
+
+
+def fly(
+    launch: Launch,
+    setup: Setup,
+    *,
+    control: Control = NO_CONTROL,
+    duration: float = 60.0,
+    ground: bool = True,
+    sample_rate: float = 0.0,
+) -> Flight:
+    """Fly a disc from its release to the ground.
+
+    Args:
+        launch: The release.
+        setup: The disc, the model, the air and the step.
+        control: Control inputs, held for the whole flight.
+        duration: Longest time of flight [s].
+        ground: End where the centre crosses z = 0 from above; else fly for `duration`.
+        sample_rate: Samples per second of the trajectory [1/s]; 0 for none.
+
+    Returns:
+        The flight; the landing is located to better than 1e-9 s of the RK4 solution.
+
+    Raises:
+        ConfigError: A value out of range, a step too long for the spin, a release underground.
+        IntegrationError: The disc turned or moved faster than the step can follow.
+    """
+    rows = check_flight(launch, setup, duration, ground=ground, sample_rate=sample_rate)
+    samples = np.empty((rows, COLUMNS))
+    ended = integrator.integrate(
+        launch.state(),
+        setup.plant,
+        setup.disc.table_rows,
+        setup.disc.spin_terms,
+        checked_control(control),
+        setup.wind_data,
+        setup.noise(duration),
+        float(setup.step),
+        float(duration),
+        ground,
+        float(sample_rate),
+        samples,
+    )
+    if ended.status == integrator.LOST:
+        raise lost(ended.t, setup.step)
+    return Flight(
+        launch=launch,
+        setup=setup,
+        control=control,
+        landed=ended.status == integrator.LANDED,
+        time=ended.t,
+        end=ended.state,
+        apex=-ended.apex_Z,
+        trajectory=Trajectory(samples[: ended.samples], setup.disc.diameter),
+    )
+
+
+def check_flight(
+    launch: Launch, setup: Setup, duration: float, *, ground: bool, sample_rate: float
+) -> int:
+    """Check the arguments of `fly` together, and return how many samples it may write.
+
+    Raises:
+        ConfigError: As of `fly`.
+    """
+    validation.number('duration', duration, above=0.0, highest=LONGEST, unit='s')
+    validation.number('sample_rate', sample_rate, 0.0, 1e5, unit='1/s')
+    setup.check_step(launch.spin, launch.speed)
+    if ground and launch.height < 0.0:
+        raise ConfigError('height', launch.height, 'with ground, release at 0 m or above')
+    rows = math.floor(duration * sample_rate * (1 + 1e-12)) + 1 if sample_rate > 0.0 else 0
+    if rows > MOST_SAMPLES:
+        raise ConfigError('sample_rate', sample_rate, f'at most {MOST_SAMPLES} samples a flight')
+    return rows
+
+
+def lost(t: float, step: float) -> IntegrationError:
+    """Return the error of a flight that was lost at a time [s] with a step [s]."""
+    return IntegrationError(
+        f'at t = {t:.6g} s the disc turned or moved faster than steps of {step:g} s can follow; '
+        'try a shorter step'
+    )
+
+
+def is_ready() -> bool:
+    """Say whether `fly` needs no compilation first (about ten seconds, once per machine)."""
+    return is_compiled(integrator.integrate)
+
+
+def _line(disc: Disc) -> Linear:
+    """Return the lines as the compiled equations take them; zeros where the disc has none."""
+    line = disc.linear
+    if line is None:
+        return Linear(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Linear(*(float(getattr(line, name)) for name in Linear._fields))
+
+
+def checked_control(control: Control) -> Control:
+    """Return the control inputs as finite floats of a sensible size."""
+
+    def within(name: str, limit: float, unit: str) -> float:
+        value = getattr(control, name)
+        return validation.number(f'control {name}', value, -limit, limit, unit=unit)
+
+    return Control(
+        C_L=within('C_L', 10.0, ''),
+        C_M=within('C_M', 10.0, ''),
+        C_N=within('C_N', 10.0, ''),
+        L=within('L', 1e3, 'N m'),
+        M=within('M', 1e3, 'N m'),
+        N=within('N', 1e3, 'N m'),
+        axes=int(control.axes),
+    )
+
+
+NO_NOISE = np.empty((0, NOISE_COLUMNS))

@@ -1,0 +1,149 @@
+"""One fixed step of the classic Runge-Kutta method, shared by every flight."""
+
+import math
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics.kernels.equations import (
+    PRECESSION,
+    Control,
+    Plant,
+    State,
+    Velocity,
+    consistent,
+    derivative,
+)
+from disc_sim_ros.physics.kernels.jit import inline, jit
+from disc_sim_ros.physics.kernels.wind import WindData, wind_at
+
+STABLE = 2.78  # largest step times rate, of a decay or an oscillation, that stays bounded
+
+
+@jit
+def rk4_step(
+    s: State,
+    h: float,
+    gust: Velocity,
+    next_gust: Velocity,
+    wind: WindData,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+) -> State:
+    """Return the state after `h`, while the gust goes straight from `gust` to `next_gust`.
+
+    See `equations.derivative` for the other arguments.
+    """
+    x, g = s, gust
+    sum_k = axpy(s, -1.0, s)  # zeros
+    for stage in range(4):  # one loop: the equations are compiled into one place
+        k = derivative(x, wind_at(x.Z, g, wind), plant, table, spin_terms, control)
+        sum_k = axpy(sum_k, 2.0 if 0 < stage < 3 else 1.0, k)
+        a = 0.5 if stage < 2 else 1.0
+        g = lerp(gust, next_gust, a)
+        x = axpy(s, a * h, k)
+    s = axpy(s, h / 6.0, sum_k)
+    return consistent(s, wind_at(s.Z, next_gust, wind), plant, table, spin_terms, control)
+
+
+@inline
+def lerp(a: Velocity, b: Velocity, f: float) -> Velocity:
+    """Return the velocity at the fraction `f` of the way from `a` to `b`."""
+    return Velocity(a.X + f * (b.X - a.X), a.Y + f * (b.Y - a.Y), a.Z + f * (b.Z - a.Z))
+
+
+@inline
+def axpy(s: State, h: float, k: State) -> State:
+    """Return s + h k."""
+    return State(
+        s.X + h * k.X,
+        s.Y + h * k.Y,
+        s.Z + h * k.Z,
+        s.VX + h * k.VX,
+        s.VY + h * k.VY,
+        s.VZ + h * k.VZ,
+        s.e0 + h * k.e0,
+        s.e1 + h * k.e1,
+        s.e2 + h * k.e2,
+        s.e3 + h * k.e3,
+        s.p + h * k.p,
+        s.q + h * k.q,
+        s.r + h * k.r,
+        s.sigma + h * k.sigma,
+    )
+
+
+@inline
+def is_sound(s: State, h: float, plant: Plant) -> bool:
+    """Say whether the state is finite, and turns slowly enough for steps of `h` to follow."""
+    total = s.X + s.Y + s.Z + s.VX + s.VY + s.VZ + s.e0 + s.e1 + s.e2 + s.e3
+    fastest = max(abs(s.p), abs(s.q), abs(s.r))
+    if plant.model != PRECESSION:
+        fastest = max(fastest, abs(s.r) * plant.I_z / plant.I_x)
+    return (abs(total + s.sigma) < math.inf) & (fastest * h <= STABLE)
+
+
+_TOLERANCE = 1e-12  # s; a thousandth of what is promised
+
+
+@jit
+def touchdown(
+    s: State,
+    h: float,
+    end: State,
+    g: Velocity,
+    next_g: Velocity,
+    wind: WindData,
+    plant: Plant,
+    table: FloatArray,
+    spin_terms: FloatArray,
+    control: Control,
+) -> tuple[float, Velocity, State]:
+    """Return when Z = 0 within a step to `end`, below the ground, and gust and state there.
+
+    Newton's method on shorter steps from `s`, from where a cubic through both ends is 0, and
+    halving where it leads away. A release on the ground is not a landing if the disc rises first:
+    then the way back counts.
+    """
+    a, b = 0.0, h
+    if s.Z >= 0.0:
+        a = 1e-6 * h
+        a_g = lerp(g, next_g, a / h)
+        if rk4_step(s, a, g, a_g, wind, plant, table, spin_terms, control).Z >= 0.0:
+            return 0.0, g, s
+    f = s.Z / (s.Z - end.Z)
+    for _ in range(3):
+        Z, slope, _ = cubic(s, end, h, f)
+        f -= Z / slope if slope != 0.0 else 0.0
+    next_x = f * h
+    for _ in range(100):
+        x = next_x if a < next_x < b else 0.5 * (a + b)
+        x_g = lerp(g, next_g, x / h)
+        x_s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
+        next_x = x - x_s.Z / x_s.VZ if x_s.VZ != 0.0 else a
+        if x_s.Z == 0.0 or abs(next_x - x) < _TOLERANCE or b - a < _TOLERANCE:
+            break
+        if x_s.Z > 0.0:
+            b = x
+        else:
+            a = x
+    return x, x_g, x_s
+
+
+@inline
+def cubic(s: State, end: State, h: float, f: float) -> tuple[float, float, float]:
+    """Return Z and two derivatives by `f`, the fraction of a step, on the cubic of its ends."""
+    rise, start, stop = end.Z - s.Z, h * s.VZ, h * end.VZ
+    c2 = 3.0 * rise - 2.0 * start - stop
+    c3 = start + stop - 2.0 * rise
+    Z = s.Z + f * (start + f * (c2 + f * c3))
+    return Z, start + f * (2.0 * c2 + f * 3.0 * c3), 2.0 * c2 + f * 6.0 * c3
+
+
+@inline
+def top(s: State, end: State, h: float) -> float:
+    """Return the least Z (down) of a step in which VZ turns from up to down."""
+    f = s.VZ / (s.VZ - end.VZ)
+    _, slope, curvature = cubic(s, end, h, f)
+    Z, _, _ = cubic(s, end, h, f - slope / curvature)
+    return Z

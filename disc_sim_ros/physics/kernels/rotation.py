@@ -1,0 +1,57 @@
+"""Placeholder."""
+
+import math
+from typing import Any
+
+from disc_sim_ros.arrays import Vector
+
+Quaternion = tuple[float, float, float, float]
+
+
+def quaternion_of_half_angles(
+    cphi: float, sphi: float, cthe: float, sthe: float, cpsi: float, spsi: float
+) -> Quaternion:
+    """Return `quaternion_from_euler` from cosine and sine of the halves of its angles."""
+    return (
+        cphi * cthe * cpsi + sphi * sthe * spsi,
+        sphi * cthe * cpsi - cphi * sthe * spsi,
+        cphi * sthe * cpsi + sphi * cthe * spsi,
+        cphi * cthe * spsi - sphi * sthe * cpsi,
+    )
+
+
+def rotation_elements(e0: Any, e1: Any, e2: Any, e3: Any) -> tuple[Any, ...]:
+    """Return the nine elements, row by row, of the matrix that takes body to earth components.
+
+    For floats or arrays, and compiled into the equations of motion. The third column is the
+    disc's z axis in axes 1. Source: transpose of paper eqn 2, corrected (docs/deviations.md).
+    """
+    return (
+        1 - 2 * (e2 * e2 + e3 * e3),
+        2 * (e1 * e2 - e0 * e3),
+        2 * (e1 * e3 + e0 * e2),
+        2 * (e1 * e2 + e0 * e3),
+        1 - 2 * (e1 * e1 + e3 * e3),
+        2 * (e2 * e3 - e0 * e1),
+        2 * (e1 * e3 - e0 * e2),
+        2 * (e2 * e3 + e0 * e1),
+        1 - 2 * (e1 * e1 + e2 * e2),
+    )
+
+
+def rotated(elements: tuple[float, ...], vector: Vector) -> Vector:
+    """Return the product of a matrix, given by its elements row by row, and a vector."""
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = elements
+    u, v, w = vector
+    return xx * u + xy * v + xz * w, yx * u + yy * v + yz * w, zx * u + zy * v + zz * w
+
+
+def cos_sin_degrees(angle: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle in degrees, exact at multiples of 90 degrees.
+
+    The sine of the opposite angle is the opposite to the last bit, so that mirrored launches are.
+    """
+    quarter, rest = divmod(abs(angle), 90.0)
+    c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
+    c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
+    return c, math.copysign(1.0, angle) * s

@@ -1,0 +1,117 @@
+"""A sampled flight and what the paper plots of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics import frames, theory
+from disc_sim_ros.physics.kernels.equations import State
+
+COLUMNS = 1 + len(State._fields) + 3  # t, the state, the wind
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Samples of one flight, in the paper's axes; n is the number of samples.
+
+    Attributes:
+        rows: Columns t, the fields of `State`, wind X, Y, Z; shape (n, 18).
+        diameter: The paper's c [m].
+    """
+
+    rows: FloatArray
+    diameter: float
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def t(self) -> FloatArray:
+        """Time since release [s], shape (n,)."""
+        return self.rows[:, 0]
+
+    @property
+    def position(self) -> FloatArray:
+        """Position of the centre in earth axes 1 [m], shape (n, 3)."""
+        return self.rows[:, 1:4]
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Velocity over the ground in earth axes 1 [m/s], shape (n, 3)."""
+        return self.rows[:, 4:7]
+
+    @property
+    def attitude(self) -> FloatArray:
+        """Quaternion of the despun axes 2 in axes 1, scalar first, shape (n, 4)."""
+        return self.rows[:, 7:11]
+
+    @property
+    def rates(self) -> FloatArray:
+        """Angular velocity p, q, r in despun axes 2 [rad/s], shape (n, 3)."""
+        return self.rows[:, 11:14]
+
+    @property
+    def spin(self) -> FloatArray:
+        """Spin rate r, clockwise from above positive [rad/s], shape (n,)."""
+        return self.rows[:, 13]
+
+    @property
+    def spin_angle(self) -> FloatArray:
+        """Angle from the despun axes 2 to the disc [rad], shape (n,)."""
+        return self.rows[:, 14]
+
+    @property
+    def wind(self) -> FloatArray:
+        """Wind at the disc, where the air moves to, earth axes 1 [m/s], shape (n, 3)."""
+        return self.rows[:, 15:18]
+
+    @property
+    def air_velocity(self) -> FloatArray:
+        """Velocity relative to the air, u, v, w in despun axes 2 [m/s], shape (n, 3)."""
+        to_earth = frames.rotation_matrix(self.attitude)
+        uvw: FloatArray = np.einsum('nji,nj->ni', to_earth, self.velocity - self.wind)
+        return uvw
+
+    @property
+    def airspeed(self) -> FloatArray:
+        """Speed relative to the air, V [m/s], shape (n,)."""
+        V: FloatArray = np.linalg.norm(self.velocity - self.wind, axis=1)
+        return V
+
+    @property
+    def alpha(self) -> FloatArray:
+        """Angle of attack [rad], -pi/2 to pi/2, shape (n,) (eqn 17)."""
+        u, v, w = self.air_velocity.T
+        alpha: FloatArray = np.arctan2(w, np.hypot(u, v))
+        return alpha
+
+    @property
+    def normal(self) -> FloatArray:
+        """Unit vector of the disc's z axis, out of the underside, earth axes 1, shape (n, 3)."""
+        return frames.rotation_matrix(self.attitude)[:, :, 2]
+
+    @property
+    def absolute_attitude(self) -> FloatArray:
+        """Angle lambda between the disc's z axis and gravity [rad], shape (n,) (eqn 50)."""
+        x, y, z = self.normal.T
+        angle: FloatArray = np.arctan2(np.hypot(x, y), z)
+        return angle
+
+    @property
+    def euler(self) -> FloatArray:
+        """Roll phi, pitch theta and yaw psi of the despun axes 2 [rad], shape (n, 3).
+
+        These are the angles that the paper's Fig. 5 plots: axes that took part in the spin would
+        give angles that go round with it.
+        """
+        return frames.euler_from_quaternion(self.attitude)
+
+    @property
+    def advance_ratio(self) -> FloatArray:
+        """Ratio AdvR = r c / (2 V) of rim speed to airspeed, shape (n,) (eqn 63).
+
+        Infinite where there is no airspeed, and not a number where there is no spin either.
+        """
+        with np.errstate(divide='ignore', invalid='ignore'):
+            return theory.advance_ratio(self.spin, self.diameter, self.airspeed)

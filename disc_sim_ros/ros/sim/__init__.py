@@ -1,0 +1,1 @@
+"""The simulator node: the disc in real time."""

@@ -1,0 +1,102 @@
+"""Which steps are due by the steady clock: absolute deadlines, catching up, slipping."""
+
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+import ctypes
+import gc
+import math
+import os
+
+CATCH_UP = 0.1  # s of wall time whose steps are made up for after a stall
+RECENT = 1000  # deadlines
+
+
+class Pacer:
+    """Counts steps against the steady clock; knows nothing of what a step is.
+
+    Deadlines are absolute, so that no lateness adds up. After a stall of more than `CATCH_UP` the
+    rest of it is given up: the simulation then runs behind the wall clock by that much.
+
+    Attributes:
+        slipped: Wall time given up so far [s].
+        slips: How often.
+        missed: Deadlines met later than one step, so far.
+        restarts: How often `restart` was called.
+        recent: Lateness of the last deadlines [s].
+        worst: Greatest lateness since `take_worst` was last called [s].
+    """
+
+    def __init__(self, step: float, rate: float, now: float) -> None:
+        """Start counting at `now` [s] for steps of `step` [s] at `rate` times real time."""
+        self.slipped = 0.0
+        self.slips = 0
+        self.missed = 0
+        self.worst = 0.0
+        self.restarts = 0
+        self.recent: deque[float] = deque(maxlen=RECENT)
+        self.restart(step, rate, now)
+
+    def restart(self, step: float, rate: float, now: float) -> None:
+        """Count anew from `now`: after a pause, a throw or a change of rate."""
+        self._period = step / rate  # s of wall time for a step
+        self._epoch = now
+        self._done = 0
+        self.restarts += 1
+
+    def due(self, now: float) -> int:
+        """Return how many steps are due at `now`, after giving up what cannot be made up for."""
+        late = now - self._epoch - (self._done + 1) * self._period
+        if late < 0.0:
+            return 0
+        self.worst = max(self.worst, late)
+        self.recent.append(late)
+        if late > self._period:
+            self.missed += 1
+        if late > CATCH_UP:
+            lost = late - CATCH_UP
+            self._epoch += lost
+            self.slipped += lost
+            self.slips += 1
+        return math.floor((now - self._epoch) / self._period + 1e-9) - self._done
+
+    def made(self, steps: int) -> None:
+        """Count steps that were made."""
+        self._done += steps
+
+    def wait(self, now: float, steps: int) -> float:
+        """Return how long to sleep until `steps` more are due [s]."""
+        return self._epoch + (self._done + steps) * self._period - now
+
+    def take_worst(self) -> float:
+        """Return the greatest lateness since the last call [s]."""
+        worst, self.worst = self.worst, 0.0
+        return worst
+
+    def quantile(self, share: float) -> float:
+        """Return the lateness that a share of the last deadlines did not exceed [s]."""
+        recent = sorted(self.recent.copy())
+        return recent[min(int(share * len(recent)), len(recent) - 1)] if recent else 0.0
+
+
+_PR_SET_TIMERSLACK = 29
+
+
+def configure_thread(priority: int, warn: Callable[[str], None]) -> None:
+    """Have the calling thread woken as exactly as the machine permits.
+
+    Args:
+        priority: SCHED_FIFO priority from 1 to 99; 0 leaves the ordinary scheduling.
+        warn: Called with a line where the machine does not permit it.
+    """
+    # Linux rounds sleeps of ordinary threads up by 50 us; another system sleeps as it can.
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    # A full collection stalls all threads for tens of milliseconds: it skips what is old by now.
+    gc.collect()
+    gc.freeze()
+    if priority > 0:
+        try:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        except (AttributeError, OSError) as error:
+            warn(f'realtime_priority: {priority} is not permitted on this machine ({error})')

@@ -1,0 +1,316 @@
+"""The launch that reaches furthest, flies longest or hits best, also under human scatter."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+import inspect
+import math
+from typing import Any
+
+import numpy as np
+from scipy import optimize
+
+from disc_sim_ros import validation
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics.ensemble import Landings, fly_many
+from disc_sim_ros.physics.kernels.integrator import LOST
+from disc_sim_ros.studies.columns import ADVANCE_RATIO, LAUNCH, quantity
+from disc_sim_ros.studies.flying import kernel_values
+from disc_sim_ros.studies.scatter import Normal, quantiles
+from disc_sim_ros.studies.study import Study
+
+RANGE, TIME, ACCURACY = 'range', 'time', 'accuracy'
+GOALS = (RANGE, TIME, ACCURACY)
+_WORST = 1e6  # of a flight that was lost
+_POPULATION = 12  # launches for each free quantity
+_GENERATIONS, _TOLERANCE = 150, 1e-5  # of the global search
+_FEW = 16  # samples of the scatter in the global search, which then is shorter
+_GENERATIONS_OF_SCATTER, _TOLERANCE_OF_SCATTER = 60, 1e-3
+_ON_LINES = 128  # samples of the scatter along the lines through the optimum
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """What is to be made best, of what, within which limits.
+
+    Attributes:
+        question: What is fixed, and how throws scatter around each launch: `Normal` without a
+            mean, `count` samples. No grid.
+        limits: Least and greatest value of each free quantity.
+        goal: 'range', 'time' or 'accuracy'.
+        target: x, y in `map` [m], for accuracy.
+        percentile: Of the results under scatter, instead of their mean, or None. Of 10 the range
+            that nine of ten throws exceed, or the distance from the target that one of ten keeps.
+
+    Raises:
+        ConfigError: Something contradicts something else.
+    """
+
+    question: Study
+    limits: Mapping[str, tuple[float, float]]
+    goal: str = RANGE
+    target: tuple[float, float] | None = None
+    percentile: float | None = None
+
+    def __post_init__(self) -> None:
+        validation.choice('goal', self.goal, GOALS)
+        if (self.goal == ACCURACY) != (self.target is not None):
+            text = 'accuracy needs a target' if self.target is None else 'only accuracy has one'
+            raise ConfigError('target', self.target, text)
+        if not self.limits:
+            raise ConfigError('limits', 'nothing', 'at least one quantity must be free')
+        for name, (low, high) in self.limits.items():
+            if name not in {*LAUNCH, ADVANCE_RATIO}:
+                allowed = f'a launch has {", ".join(LAUNCH)} and {ADVANCE_RATIO}'
+                raise ConfigError(f'limit {name}', 'free', allowed)
+            lowest, highest = self.question.bounds(quantity('limits', name).name)
+            if not lowest <= low < high <= highest:
+                allowed = f'from {lowest:g} to {highest:g}, the lower first and less'
+                raise ConfigError(f'limit {name}', [low, high], allowed)
+        for name, law in self.question.scatter.items():
+            if not isinstance(law, Normal) or law.mean is not None:
+                raise ConfigError(f'scatter {name}', str(law), 'give a standard deviation alone')
+        if self.percentile is not None:
+            validation.number('percentile', self.percentile, 1.0, 99.0)
+            if not self.scatters:
+                raise ConfigError('percentile', self.percentile, 'nothing scatters')
+        if 'spin' in self.limits and self.question.advance_ratio is not None:
+            raise ConfigError('limit spin', 'free', 'the advance ratio gives it')
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Return the names of the free quantities."""
+        return tuple(self.limits)
+
+    @property
+    def fastest_spin(self) -> float:
+        """Return the greatest spin that a launch within the limits can have [rad/s]."""
+        question = self.question
+        law = question.scatter.get('spin')
+        wide = 6.0 * law.sd if isinstance(law, Normal) else 0.0
+        if ADVANCE_RATIO in self.limits or question.advance_ratio is not None:
+            ratio = max(map(abs, self.limits.get(ADVANCE_RATIO, (question.advance_ratio or 0,))))
+            speed = max(map(abs, self.limits.get('speed', (question.fixed('speed'),))))
+            return 2.0 * speed * ratio / question.setup.disc.diameter
+        return max(map(abs, self.limits.get('spin', (question.fixed('spin'),)))) + wide
+
+    @property
+    def scatters(self) -> bool:
+        """Say whether throws of one launch differ."""
+        return bool(self.question.scatter) or self.question.gusts_differ
+
+    @cached_property
+    def fixed_target(self) -> tuple[float, float]:
+        """Return the target, or the origin where there is none."""
+        return self.target or (0.0, 0.0)
+
+    def landings(self, launches: FloatArray, samples: int) -> Landings:
+        """Fly the scatter of each launch.
+
+        Args:
+            launches: Values of the free quantities, shape (n, free).
+            samples: Throws of each; the same scatter for each launch.
+
+        Returns:
+            n x samples flights, those of one launch together.
+        """
+        question = self.question
+        n = len(launches)
+        values: dict[str, FloatArray] = {
+            name: np.repeat(launches[:, j], samples) for j, name in enumerate(self.free)
+        }
+        if question.scatter:
+            scores = np.tile(question.scores(0, samples), (n, 1))
+            for j, (name, law) in enumerate(question.scatter.items()):
+                centre = values.get(name, question.fixed(name))
+                values[name] = quantiles(law, scores[:, j], centre, *question.bounds(name))
+        seeds = question.gust_seeds(0, samples)
+        return fly_many(
+            kernel_values(question, values),
+            question.setup,
+            control=question.control,
+            seeds=None if seeds is None else np.tile(seeds, n),
+            duration=question.duration,
+        )
+
+    def results(self, ended: Landings) -> FloatArray:
+        """Return what the goal is about of each flight: range [m], time [s] or distance [m]."""
+        if self.goal == ACCURACY:
+            x, y = self.fixed_target
+            found = np.hypot(ended.x - x, ended.y - y)
+            return np.where(ended.status == LOST, _WORST, found)
+        found = ended.range if self.goal == RANGE else ended.time
+        return np.where(ended.status == LOST, 0.0, found)
+
+    def values(self, launches: FloatArray, samples: int) -> FloatArray:
+        """Return the mean or the percentile of the results of each launch, shape (n,)."""
+        samples = samples if self.scatters else 1
+        found = self.results(self.landings(launches, samples)).reshape(len(launches), samples)
+        if self.percentile is None:
+            mean: FloatArray = found.mean(axis=1)
+            return mean
+        percentile: FloatArray = np.percentile(found, self.percentile, axis=1)
+        return percentile
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best launch that was found.
+
+    Attributes:
+        problem: What was searched.
+        launch: Values of the free quantities, rounded to what `fly` is told.
+        value: Mean or percentile of the results, of all samples.
+        results: Results of the samples, shape (samples,).
+        flat: Of each free quantity the range around the optimum in which the value stays within
+            `slack`, the others unchanged.
+        at_limit: Free quantities that a limit holds.
+        launches: Launches that were tried.
+    """
+
+    problem: Problem
+    launch: dict[str, float]
+    value: float
+    results: FloatArray
+    flat: dict[str, tuple[float, float]]
+    at_limit: tuple[str, ...]
+    launches: int
+
+    @property
+    def slack(self) -> float:
+        """Return how much worse still counts as flat: 1 %, for accuracy 5 cm at least."""
+        return slack(self.problem, self.value)
+
+    @property
+    def question(self) -> Study:
+        """Return the question with this launch, to fly its scatter."""
+        return at(self.problem.question, self.launch)
+
+
+def optimise(problem: Problem, seed: int = 0) -> Optimum:
+    """Return the best launch: differential evolution over the limits, then a simplex search.
+
+    The same problem and seed give the same launch. Differential evolution may miss a narrow best;
+    another seed tells.
+
+    Args:
+        problem: What to make best.
+        seed: Of the search.
+
+    Source: Storn & Price, J. of Global Optimization 11 (1997) 341-359; Nelder & Mead, Computer J.
+    7 (1965) 308-313; both of scipy.
+    """
+    sign = 1.0 if problem.goal == ACCURACY else -1.0
+    low, high = np.array(list(problem.limits.values())).T
+    samples = problem.question.count
+    tried = 0
+
+    def cost(unit: FloatArray, few: int) -> FloatArray:
+        nonlocal tried
+        tried += len(unit)
+        return sign * problem.values(low + np.clip(unit, 0.0, 1.0) * (high - low), few)
+
+    found = optimize.differential_evolution(
+        lambda x: cost(x.T if x.ndim > 1 else x[None], min(samples, _FEW)),
+        [(0.0, 1.0)] * len(low),
+        vectorized=True,
+        updating='deferred',
+        init='sobol',
+        popsize=_POPULATION,
+        maxiter=_GENERATIONS_OF_SCATTER if problem.scatters else _GENERATIONS,
+        tol=_TOLERANCE_OF_SCATTER if problem.scatters else _TOLERANCE,
+        polish=False,
+        **_seeded(seed),
+    )
+    best = found.x
+    for width in (0.05, 0.005):  # again from the best: a simplex can collapse
+        simplex = np.clip(best + width * np.vstack([np.zeros(len(low)), np.eye(len(low))]), 0, 1)
+        turned = np.where(best + width > 1.0, best - width, simplex.max(axis=0))
+        for j in range(len(low)):
+            simplex[j + 1, j] = turned[j]
+        found = optimize.minimize(
+            lambda x: cost(x[None], samples)[0],
+            best,
+            method='Nelder-Mead',
+            bounds=[(0.0, 1.0)] * len(low),
+            options={'initial_simplex': simplex, 'xatol': 1e-5, 'fatol': 1e-7, 'maxfev': 200},
+        )
+        best = found.x
+    launch = {
+        name: _rounded(value, *problem.limits[name])
+        for name, value in zip(problem.free, low + best * (high - low), strict=True)
+    }
+    return _described(problem, launch, tried)
+
+
+def at(question: Study, launch: Mapping[str, float]) -> Study:
+    """Return a question whose throws have the launch: fields of Launch, or an advance ratio."""
+    fields = {name: value for name, value in launch.items() if name in LAUNCH}
+    ratio = launch.get(ADVANCE_RATIO, question.advance_ratio)
+    return replace(question, launch=replace(question.launch, **fields), advance_ratio=ratio)
+
+
+def slack(problem: Problem, value: float) -> float:
+    """Return how much worse than `value` still counts as flat."""
+    return max(0.01 * value, 0.05) if problem.goal == ACCURACY else 0.01 * value
+
+
+def lines(
+    problem: Problem, launch: Mapping[str, float], points: int = 161
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return the value along each free quantity, the others as in `launch`: x and value."""
+    found = {}
+    centre = np.array([launch[name] for name in problem.free])
+    for j, (name, (low, high)) in enumerate(problem.limits.items()):
+        x = np.unique(np.append(np.linspace(low, high, points), centre[j]))
+        launches = np.tile(centre, (len(x), 1))
+        launches[:, j] = x
+        samples = min(problem.question.count, _ON_LINES)
+        found[name] = (x, problem.values(launches, samples))
+    return found
+
+
+def _described(problem: Problem, launch: dict[str, float], tried: int) -> Optimum:
+    centre = np.array([[launch[name] for name in problem.free]])
+    samples = problem.question.count if problem.scatters else 1
+    results = problem.results(problem.landings(centre, samples))
+    value = float(problem.values(centre, samples)[0])
+    flat = {}
+    sign = 1.0 if problem.goal == ACCURACY else -1.0
+    for name, (x, values) in lines(problem, launch).items():
+        place = int(np.searchsorted(x, launch[name]))
+        good = sign * (values - values[place]) <= slack(problem, abs(float(values[place])))
+        below = np.flatnonzero(~good[:place])
+        above = np.flatnonzero(~good[place:])
+        first = int(below[-1]) + 1 if len(below) else 0
+        last = place + int(above[0]) - 1 if len(above) else len(x) - 1
+        flat[name] = (float(x[first]), float(x[last]))
+    at_limit = tuple(
+        name
+        for name, (low, high) in problem.limits.items()
+        if min(launch[name] - low, high - launch[name]) <= 1e-3 * (high - low)
+    )
+    return Optimum(problem, launch, value, results, flat, at_limit, tried)
+
+
+def _rounded(value: float, low: float, high: float) -> float:
+    """Return a value with the digits that a thrower could ever mean, within the limits."""
+    digits = max(0, 4 - math.floor(math.log10(high - low)))
+    return float(min(max(round(float(value), digits), low), high))
+
+
+def _seeded(seed: int) -> dict[str, Any]:
+    """Return the seed under the name that this scipy knows."""
+    known = inspect.signature(optimize.differential_evolution).parameters
+    return {'rng' if 'rng' in known else 'seed': np.random.default_rng(seed)}
+
+
+HUMAN_LIMITS = {
+    'speed': (5.0, 25.0),  # m/s
+    'pitch': (-20.0, 60.0),  # degrees
+    'roll': (-60.0, 60.0),  # degrees
+    'spin': (10.0, 70.0),  # rad/s
+}
+# Standard deviations of a practised thrower, in the same units.
+HUMAN_SCATTER = {'speed': 0.5, 'pitch': 1.5, 'roll': 2.0, 'yaw': 1.5, 'spin': 3.0}

@@ -1,0 +1,64 @@
+"""Plot of an optimum: its flight, and how fast the result falls off around it."""
+
+import math
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+import numpy as np
+
+from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.studies.columns import quantity
+from disc_sim_ros.studies.optimise import Optimum, lines
+from disc_sim_ros.studies.optimise_report import WHAT, statistic_of, still_flight, told
+
+BLUE, ORANGE = '#0072b2', '#d55e00'  # Okabe and Ito: safe for every eye
+
+
+def figure(optimum: Optimum) -> Figure:
+    """Return the flight of an optimum, and how the value falls off along each free quantity."""
+    problem = optimum.problem
+    what, unit = WHAT[problem.goal]
+    found = lines(problem, optimum.launch)
+    columns = max(2, min(3, len(found)))
+    rows = 1 + math.ceil(len(found) / columns)
+    page = Figure(figsize=(12, 3.6 * rows), layout='constrained')
+    FigureCanvasAgg(page)
+    grid = page.add_gridspec(rows, 2 * columns)
+    flight = still_flight(optimum, 100.0)
+    x, y, z = map_from_paper(flight.trajectory.position).T
+    for side, across, label in ((0, z, 'height z, m'), (1, y, 'left y, m')):
+        axis = page.add_subplot(grid[0, side * columns : (side + 1) * columns])
+        axis.plot(x, across, color=BLUE)
+        axis.plot(0.0, across[0], 'k^', label='release')
+        if problem.target and side:
+            axis.plot(*problem.target, 'x', color=ORANGE, ms=10, mew=2.5, label='target')
+        if problem.scatters and side:
+            landed = problem.landings(np.array([list(optimum.launch.values())]), _dots(optimum))
+            axis.plot(landed.x, landed.y, '.', color=BLUE, ms=3, alpha=0.5, label='landings')
+        axis.set(xlabel='forward x, m', ylabel=label)
+        axis.set_aspect('equal', adjustable='datalim')
+        axis.grid(alpha=0.3)
+        axis.legend(loc='best', fontsize=9)
+    for k, (name, (at, values)) in enumerate(found.items()):
+        column = 2 * (k % columns)
+        axis = page.add_subplot(grid[1 + k // columns, column : column + 2])
+        axis.plot(at, values, color=BLUE)
+        axis.axvspan(*optimum.flat[name], color=ORANGE, alpha=0.2,
+                     label=f'within {optimum.slack:.2g} {unit}')  # fmt: skip
+        best = values[int(np.searchsorted(at, optimum.launch[name]))]
+        axis.plot(optimum.launch[name], best, '*', color=ORANGE, ms=13, label='optimum')
+        axis.set(xlabel=quantity('', name).label, ylabel=f'{statistic_of(optimum)}{what}, {unit}')
+        axis.grid(alpha=0.3)
+        axis.legend(loc='best', fontsize=9)
+    aim = f' at {problem.target[0]:g}, {problem.target[1]:g} m' if problem.target else ''
+    launch = ', '.join(told(name, value) for name, value in optimum.launch.items())
+    page.suptitle(
+        f'{problem.question.setup.disc.name}, best {problem.goal}{aim}: {launch}',
+        fontsize=11,
+        parse_math=False,  # a file may have dollars in its name
+    )
+    return page
+
+
+def _dots(optimum: Optimum) -> int:
+    return min(optimum.problem.question.count, 2000)

@@ -1,0 +1,170 @@
+"""An optimum as lines to read and as a document."""
+
+from dataclasses import replace
+import math
+import shlex
+from typing import Any
+
+import numpy as np
+
+from disc_sim_ros.physics import theory
+from disc_sim_ros.physics.flight import Flight, Setup, fly
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.studies.columns import CONTROL, LAUNCH, SHORT, WIND, quantity
+from disc_sim_ros.studies.optimise import ACCURACY, Optimum, slack
+from disc_sim_ros.studies.study import Study, study_document
+
+WHAT = {'range': ('range', 'm'), 'time': ('time of flight', 's'),
+         'accuracy': ('distance from the target', 'm')}  # fmt: skip
+_FLAGS = {'angle_of_attack': '--alpha'}
+
+
+def still_launch(question: Study) -> Launch:
+    """Return the launch of a question, with the spin of its advance ratio."""
+    launch, ratio = question.launch, question.advance_ratio
+    if ratio is None:
+        return launch
+    spin = theory.spin_rate(ratio, question.setup.disc.diameter, launch.speed)
+    return replace(launch, spin=spin)
+
+
+def still_flight(optimum: Optimum, sample_rate: float = 0.0) -> Flight:
+    """Return the flight of the optimum itself, without scatter, as `fly` flies it."""
+    question = optimum.question
+    return fly(
+        still_launch(question),
+        question.setup,
+        control=question.control,
+        duration=question.duration,
+        sample_rate=sample_rate,
+    )
+
+
+def text(optimum: Optimum, command: str) -> str:
+    """Return an optimum in a few lines.
+
+    Args:
+        optimum: What was found.
+        command: The line that flies it again.
+    """
+    problem, flight = optimum.problem, still_flight(optimum)
+    what, unit = WHAT[problem.goal]
+    aim = 'least' if problem.goal == ACCURACY else 'greatest'
+    statistic = statistic_of(optimum)
+    values = ', '.join(told(name, value) for name, value in optimum.launch.items())
+    x, y, _ = flight.position
+    found = [
+        f'{problem.question.setup.disc.name}: {aim} {statistic}{what}',
+        f'  launch   {values}',
+        f'  flight   {flight.range:.2f} m, x {x:.2f}, y {y:.2f} m, in {flight.time:.2f} s, apex '
+        f'{flight.apex:.2f} m'
+        + (f', {_miss(optimum, flight):.2f} m from the target' if problem.target else ''),
+    ]
+    if problem.scatters:
+        spread = ', '.join(
+            f'{name} ± {law.sd:g} {SHORT.get(quantity("", name).unit, quantity("", name).unit)}'
+            for name, law in problem.question.scatter.items()
+            if hasattr(law, 'sd')
+        )
+        r = optimum.results
+        found += [
+            f'  scatter  {spread or "gusts"}: {len(r)} throws',
+            f'  result   {what}: mean {r.mean():.2f}, sd {r.std(ddof=1):.2f}, 10 % below '
+            f'{np.percentile(r, 10):.2f}, 90 % below {np.percentile(r, 90):.2f} {unit}',
+        ]
+    flat = ', '.join(
+        f'{name} {low:.4g} to {high:.4g}' for name, (low, high) in optimum.flat.items()
+    )
+    found.append(f'  flat     {slack(problem, optimum.value):.2g} {unit} worse at most: {flat}')
+    if optimum.at_limit:
+        found.append(f'  limits   hold {" and ".join(optimum.at_limit)}')
+    found += [f'  tried    {optimum.launches} launches', f'  again    {command}']
+    return '\n'.join(found)
+
+
+def optimum_document(optimum: Optimum, command: str) -> dict[str, Any]:
+    """Return an optimum as values that JSON knows; keys carry units."""
+    problem, flight = optimum.problem, still_flight(optimum)
+    r = optimum.results
+    return {
+        'for': problem.goal,
+        'target_m': problem.target,
+        'percentile': problem.percentile,
+        'limits': {quantity('', n).column: list(span) for n, span in problem.limits.items()},
+        'launch': {quantity('', n).column: value for n, value in optimum.launch.items()},
+        'value': optimum.value,
+        'flight': {
+            'range_m': flight.range,
+            'position_m': flight.position.tolist(),
+            'flight_time_s': flight.time,
+            'apex_m': flight.apex,
+        },
+        'throws': len(r),
+        'mean': float(r.mean()),
+        'sd': float(r.std(ddof=1)) if len(r) > 1 else 0.0,
+        'flat': {quantity('', n).column: list(span) for n, span in optimum.flat.items()},
+        'flat_slack': optimum.slack,
+        'at_limit': list(optimum.at_limit),
+        'launches_tried': optimum.launches,
+        'command': command,
+        'question': study_document(optimum.question),
+    }
+
+
+def command(optimum: Optimum, disc: str) -> str:
+    """Return the `fly` command that flies an optimum again, without scatter.
+
+    Args:
+        optimum: What was found.
+        disc: Name or file of the disc, as `fly --disc` takes it.
+    """
+    question = optimum.question
+    setup, usual = question.setup, Setup(disc=question.setup.disc)
+    words = ['fly']
+
+    def add(flag: str, *values: object, default: object = None) -> None:
+        if values != (default,):
+            words.extend(
+                [flag, *(f'{v:.12g}' if isinstance(v, float) else str(v) for v in values)]
+            )
+
+    add('--disc', disc, default='frisbee')
+    for name in ('model', 'aero', 'moment_axes'):
+        add(f'--{name.replace("_", "-")}', getattr(setup, name), default=getattr(usual, name))
+    release = still_launch(question)
+    for name in LAUNCH:
+        flag = _FLAGS.get(name, f'--{name.replace("_", "-")}')
+        add(flag, getattr(release, name), default=getattr(Launch(), name))
+    for flag, names in (('--control', CONTROL), ('--wind', WIND)):
+        values = [question.fixed(name) + 0.0 for name in names]
+        if any(values):
+            add(flag, *values)
+    if setup.wind.turbulence > 0.0:
+        add('--turbulence', setup.wind.turbulence)
+        add('--seed', setup.wind.seed)
+    add('--air-density', setup.air.density, default=usual.air.density)
+    add('--gravity', setup.air.gravity, default=usual.air.gravity)
+    add('--step', setup.step, default=usual.step)
+    add('--duration', question.duration, default=60.0)
+    return shlex.join(words)
+
+
+def _miss(optimum: Optimum, flight: Flight) -> float:
+    x, y = optimum.problem.fixed_target
+    return math.hypot(flight.position[0] - x, flight.position[1] - y)
+
+
+def statistic_of(optimum: Optimum) -> str:
+    """Return what of the throws is best, to go before the name of the result."""
+    if not optimum.problem.scatters:
+        return ''
+    percentile = optimum.problem.percentile
+    return 'mean ' if percentile is None else f'{percentile:g} % percentile of the '
+
+
+def told(name: str, value: float) -> str:
+    """Return a value with its name and unit."""
+    q = quantity('', name)
+    return f'{name.replace("_", " ")} {value:.6g} {SHORT.get(q.unit, q.unit)}'.strip().replace(
+        ' °', '°'
+    )

@@ -1,0 +1,187 @@
+"""Plots of ensembles: landings with their ellipses, curves, maps and sensitivities."""
+
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.studies import report, tables
+from disc_sim_ros.studies.columns import RESULTS, quantity
+from disc_sim_ros.studies.summary import ANSWERS, ELLIPSES, Ellipse, Summary, good_status, radius2
+
+BLUE, ORANGE, GREEN = '#0072b2', '#d55e00', '#009e73'  # Okabe and Ito: safe for every eye
+_COLOURS = {'range_m': BLUE, 'drift_m': ORANGE, 'time_s': GREEN}
+_MOST_DOTS = 5000  # landings that are drawn one by one
+_CELLS = 120  # of a density, along its longer side
+_MOST_BARS = 12
+
+
+def figure(flights: Path | tables.Columns, summary: Summary) -> Figure:
+    """Return the plot that suits the question.
+
+    Landings and sensitivities of scatter; curves of a grid of one quantity; maps of one of two;
+    of more, the best over all others for each quantity.
+
+    Args:
+        flights: What `run.sweep` wrote or `run.collect` returned.
+        summary: Its summary.
+    """
+    dimensions = len(summary.question.vary)
+    page = Figure(figsize=(12, 6.5), layout='constrained')
+    FigureCanvasAgg(page)
+    if dimensions == 0 or summary.grid is None:
+        if summary.sensitivities:
+            left, right = page.subplots(1, 2, width_ratios=(1.5, 1))
+            _sensitivities(right, summary)
+        else:
+            left = page.subplots()
+        _landings(left, flights, summary)
+    elif dimensions == 1:
+        _curves(page, summary)
+    elif dimensions == 2:
+        _maps(page, summary)
+    else:
+        _best_curves(page, summary)
+    page.suptitle(
+        f'{report.headline(summary)}\n{report.study_text(summary.question)}',
+        fontsize=11,
+        parse_math=False,  # a file may have dollars in its name
+    )
+    return page
+
+
+def _landings(axis: Axes, flights: Path | tables.Columns, summary: Summary) -> None:
+    axis.set(xlabel=RESULTS['x_m'], ylabel=RESULTS['y_m'])
+    axis.set_aspect('equal', adjustable='datalim')
+    axis.grid(alpha=0.3)
+    axis.plot(0, 0, 'k^', label='release')
+    good = good_status(summary.question)
+    chunks = (
+        tables.chunks(flights, ['status', 'x_m', 'y_m'])
+        if isinstance(flights, Path)
+        else iter([flights])
+    )
+    landed = summary.counts['landed' if summary.question.ground else 'flying']
+    if landed <= _MOST_DOTS:
+        for chunk in chunks:
+            chosen = chunk['status'] == good
+            axis.plot(chunk['x_m'][chosen], chunk['y_m'][chosen], '.', color=BLUE, ms=3, alpha=0.5)
+    else:
+        x, y = summary.spreads['x_m'], summary.spreads['y_m']
+        size = max(x.greatest - x.least, y.greatest - y.least) / _CELLS or 1.0
+        x_edges = np.arange(x.least, x.greatest + 2 * size, size)
+        y_edges = np.arange(y.least, y.greatest + 2 * size, size)
+        density = np.zeros((len(x_edges) - 1, len(y_edges) - 1))
+        for chunk in chunks:
+            chosen = chunk['status'] == good
+            density += np.histogram2d(
+                chunk['x_m'][chosen], chunk['y_m'][chosen], (x_edges, y_edges)
+            )[0]
+        shown = np.ma.masked_equal(density.T / size**2, 0.0)
+        mesh = axis.pcolormesh(x_edges, y_edges, shown, cmap='Blues', norm=LogNorm())
+        axis.figure.colorbar(mesh, ax=axis, label='landings per m²', shrink=0.8)
+    if summary.ellipse is not None and summary.question.count > 1:
+        _ellipses(axis, summary.ellipse)
+    axis.legend(loc='best', fontsize=9)
+
+
+def _ellipses(axis: Axes, ellipse: Ellipse) -> None:
+    turn = np.linspace(0.0, 2 * np.pi, 200)
+    values, vectors = np.linalg.eigh(ellipse.covariance)
+    circle = np.stack([np.cos(turn), np.sin(turn)])
+    shape = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)
+    for percent, line in zip(ELLIPSES, ('-', '--', ':'), strict=True):
+        x, y = np.array(ellipse.centre)[:, None] + np.sqrt(radius2(percent)) * shape
+        share = f'{percent} % ellipse, {ellipse.inside[percent]:.1%} in it'
+        axis.plot(x, y, color=ORANGE, ls=line, lw=1.6, label=share)
+    axis.plot(*ellipse.centre, '+', color=ORANGE, ms=10, mew=2)
+
+
+def _sensitivities(axis: Axes, summary: Summary) -> None:
+    """Draw standardised regression coefficients, the strongest on top."""
+    names = list(dict.fromkeys(s.quantity for s in summary.sensitivities))
+    found = {(s.quantity, s.answer): s.correlation for s in summary.sensitivities}
+    names.sort(key=lambda name: max(abs(found.get((name, a), 0.0)) for a in ANSWERS))
+    names = names[-_MOST_BARS:]
+    place = np.arange(len(names))
+    for k, answer in enumerate(ANSWERS):
+        lengths = [found.get((name, answer), 0.0) for name in names]
+        label = f'{answer.rpartition("_")[0]}, R² {summary.explained.get(answer, 0.0):.2f}'
+        axis.barh(place + 0.26 * (1 - k), lengths, 0.24, color=_COLOURS[answer], label=label)
+    axis.set_yticks(place, [name.replace('_', ' ') for name in names])
+    axis.axvline(0.0, color='black', lw=0.8)
+    axis.set(xlabel='sd of the result per sd of the quantity (linear regression)')
+    axis.grid(alpha=0.3, axis='x')
+    axis.legend(loc='best', fontsize=9)
+
+
+def _curves(page: Figure, summary: Summary) -> None:
+    ((name, values),) = summary.question.vary.items()
+    mean, sd = _grid(summary)
+    order = np.argsort(values)
+    x = np.asarray(values, dtype=float)[order]
+    for axis, (j, answer) in zip(
+        page.subplots(len(ANSWERS), 1, sharex=True), enumerate(ANSWERS), strict=True
+    ):
+        colour, y, width = _COLOURS[answer], mean[order, j], sd[order, j]
+        marker = '.' if len(x) <= 60 else ''
+        axis.plot(x, y, marker=marker, color=colour, label='mean')
+        if summary.question.count > 1:
+            axis.fill_between(x, y - width, y + width, color=colour, alpha=0.25, label='± 1 sd')
+            axis.legend(loc='best', fontsize=9)
+        axis.set_ylabel(RESULTS[answer])
+        axis.grid(alpha=0.3)
+    axis.set_xlabel(quantity('name', name).label)
+
+
+def _maps(page: Figure, summary: Summary) -> None:
+    (x_name, x), (y_name, y) = summary.question.vary.items()
+    mean, _ = _grid(summary)
+    x_order, y_order = np.argsort(x), np.argsort(y)
+    for axis, answer in zip(page.subplots(1, 2), ('range_m', 'time_s'), strict=True):
+        found = mean[:, ANSWERS.index(answer)].reshape(len(x), len(y))[np.ix_(x_order, y_order)].T
+        x_line, y_line = np.asarray(x)[x_order], np.asarray(y)[y_order]
+        mesh = axis.pcolormesh(x_line, y_line, found, cmap='viridis', shading='nearest')
+        if min(found.shape) > 2 and np.nanmin(found) < np.nanmax(found):
+            lines = axis.contour(x_line, y_line, found, 8, colors='white', linewidths=0.8)
+            axis.clabel(lines, fontsize=8)
+        axis.figure.colorbar(mesh, ax=axis, label=RESULTS[answer])
+        best = next(b for b in summary.best if b.answer == answer)
+        label = f'best, {best.mean:.2f} {answer.rpartition("_")[2]}'
+        axis.plot(
+            best.values[x_name], best.values[y_name], '*', ms=14, mfc=ORANGE, mec='white',
+            label=label, clip_on=False,
+        )  # fmt: skip
+        axis.legend(loc='best', fontsize=9)
+        axis.set(xlabel=quantity('name', x_name).label, ylabel=quantity('name', y_name).label)
+
+
+def _best_curves(page: Figure, summary: Summary) -> None:
+    """Draw for each quantity the best that all others allow."""
+    question = summary.question
+    mean = _grid(summary)[0].reshape((*question.shape, len(ANSWERS)))
+    axes = page.subplots(2, len(question.shape), squeeze=False, sharey='row')
+    for row, answer in zip(axes, ('range_m', 'time_s'), strict=True):
+        row[0].set_ylabel(f'greatest {RESULTS[answer]}')
+        best = next(b for b in summary.best if b.answer == answer)
+        for i, (name, values) in enumerate(question.vary.items()):
+            others = tuple(k for k in range(len(question.shape)) if k != i)
+            top = np.nanmax(mean[..., ANSWERS.index(answer)], axis=others)
+            order = np.argsort(values)
+            x = np.asarray(values)[order]
+            row[i].plot(x, top[order], marker='.', color=_COLOURS[answer])
+            row[i].plot(best.values[name], best.mean, '*', ms=13, color=ORANGE, label='best')
+            row[i].set_xlabel(quantity('name', name).label)
+            row[i].grid(alpha=0.3)
+    axes[0, 0].legend(loc='best', fontsize=9)
+
+
+def _grid(summary: Summary) -> tuple[FloatArray, FloatArray]:
+    """Return mean and standard deviation of `ANSWERS` at each point, shape (points, 3)."""
+    if summary.grid is None:
+        raise ValueError('a plot of a grid needs one')
+    return summary.grid.mean, np.sqrt(np.nan_to_num(summary.grid.variance))

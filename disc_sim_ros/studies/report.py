@@ -1,0 +1,189 @@
+"""The summary of an ensemble as lines to read and as a document for programs."""
+
+from dataclasses import asdict
+import math
+from typing import Any
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.studies.columns import SHORT, WIND, quantity
+from disc_sim_ros.studies.scatter import Normal
+from disc_sim_ros.studies.study import Study, study_document
+from disc_sim_ros.studies.summary import ANSWERS, ELLIPSES, Ellipse, Summary
+
+_ONE = {'degrees': 'degree'}
+_SHOWN = ('range_m', 'drift_m', 'time_s', 'apex_m')
+
+
+def summary_text(summary: Summary) -> str:
+    """Return a summary in a screen of lines."""
+    lines = [headline(summary)]
+    lines += _spread_lines(summary)
+    question = summary.question
+    if question.count > 1 and not question.vary and summary.ellipse is not None:
+        lines += _ellipse_lines(summary.ellipse)
+    for best in summary.best:
+        what = {'range_m': 'furthest', 'time_s': 'longest'}[best.answer]
+        where = ', '.join(_value(name, value) for name, value in best.values.items())
+        sd = f', sd {best.sd:.2f}' if question.count > 1 else ''
+        unit = best.answer.rpartition('_')[2]
+        lines.append(f'  {what:9}{best.mean:.2f} {unit}{sd} at {where}')
+    lines += _sensitivity_lines(summary)
+    return '\n'.join(lines)
+
+
+def headline(summary: Summary) -> str:
+    """Return what was flown and how it ended, in one line."""
+    question, counts = summary.question, summary.counts
+    made = []
+    if question.vary:
+        sizes = ' x '.join(str(n) for n in question.shape)
+        made.append(f'grid of {sizes} points' if len(question.shape) > 1 else f'{sizes} points')
+    if question.count > 1:
+        made.append(f'{question.count} samples{" each" if question.vary else ""}')
+    ends = {'landed': 'landed', 'flying': 'still in the air', 'lost': 'lost'}
+    told = [f'{counts[end]} {text}' for end, text in ends.items() if counts[end]]
+    flown = f'{question.setup.disc.name}: {question.size} flights ({", ".join(made)})'
+    return f'{flown}: {", ".join(told)}'
+
+
+def study_text(question: Study) -> str:
+    """Return what differs from flight to flight, in one line."""
+    found = []
+    for name, values in question.vary.items():
+        sd = question.scatter.get(name)
+        around = f', each ± {sd.sd:g}' if isinstance(sd, Normal) else ''
+        found.append(_told(name, f'{values[0]:g} to {values[-1]:g}{around}'))
+    for name, law in question.scatter.items():
+        if isinstance(law, Normal):
+            if name not in question.vary:
+                found.append(_told(name, f'{_mean(question, name, law):g} ± {law.sd:g}'))
+        else:
+            found.append(_told(name, f'{law.low:g} to {law.high:g}'))
+    wind = [question.fixed(name) for name in WIND]
+    if any(wind):
+        found.append('wind {:g} {:g} {:g} m/s'.format(*wind))
+    if question.setup.wind.turbulence:
+        found.append(f'gusts of {question.setup.wind.turbulence:g} m/s')
+    return '; '.join(found)
+
+
+def summary_document(summary: Summary) -> dict[str, Any]:
+    """Return a summary as values that JSON knows; keys carry units."""
+    ellipse = summary.ellipse
+    return {
+        'question': study_document(summary.question),
+        'flights': summary.question.size,
+        'counts': summary.counts,
+        'results': {
+            name: {
+                'mean': s.mean,
+                'sd': s.sd,
+                'least': s.least,
+                'greatest': s.greatest,
+                'percentiles': {f'{p:g}': value for p, value in s.percentiles.items()},
+            }
+            for name, s in summary.spreads.items()
+        },
+        'landing_ellipse': None if ellipse is None else _ellipse_document(ellipse),
+        'best': [
+            {'of': b.answer, 'at': columns_of(b.values), 'mean': b.mean, 'sd': b.sd}
+            for b in summary.best
+        ],
+        'sensitivities': [asdict(s) for s in summary.sensitivities],
+        'explained_by_regression': summary.explained,
+    }
+
+
+def columns_of(values: dict[str, float]) -> dict[str, float]:
+    """Return values by quantity under the names of their columns, with units."""
+    return {quantity('name', name).column: value for name, value in values.items()}
+
+
+def _spread_lines(summary: Summary) -> list[str]:
+    if not summary.spreads:
+        return ['  no flight ended as it should: try a longer --duration or a shorter --step']
+    lines = ['                 mean       sd       5%      50%      95%    least greatest']
+    for name in _SHOWN:
+        s = summary.spreads[name]
+        quantity_name, _, unit = name.rpartition('_')
+        numbers = (s.mean, s.sd, *(s.percentiles[p] for p in (5.0, 50.0, 95.0)), s.least,
+                   s.greatest)  # fmt: skip
+        text = ''.join(f' {x:8.2f}' for x in numbers)
+        lines.append(f'  {quantity_name:7}{unit:>3}{text}')
+    return lines
+
+
+def _ellipse_lines(ellipse: Ellipse) -> list[str]:
+    x, y = ellipse.centre
+    long, short, angle = ellipse.semi_axes(50)
+    side = 'left' if angle >= 0.0 else 'right'
+    lines = [
+        f'  landings around x {x:.2f}, y {y:.2f} m; ellipses of a normal law, long axis '
+        f'{abs(angle):.0f} degrees {side} of x:'
+    ]
+    for percent in ELLIPSES:
+        long, short, _ = ellipse.semi_axes(percent)
+        lines.append(
+            f'    {percent}%: half axes {long:.2f} and {short:.2f} m, in it '
+            f'{ellipse.inside[percent]:.1%} of the landings'
+        )
+    return lines
+
+
+def _sensitivity_lines(summary: Summary) -> list[str]:
+    if not summary.sensitivities:
+        return []
+    lines = []
+    for answer in ANSWERS:
+        rows = [s for s in summary.sensitivities if s.answer == answer]
+        if not rows:
+            continue
+        name, _, unit = answer.rpartition('_')
+        rows.sort(key=lambda s: -abs(s.correlation))
+        share = '' if rows[0].first_order is None else '; share: first-order Sobol index'
+        explained = summary.explained[answer]
+        lines.append(f'  {name} follows (linear regression, R^2 {explained:.2f}{share})')
+        for s in rows[:8]:
+            q = quantity('name', s.quantity)
+            per = f'{unit} per {_ONE.get(q.unit, q.unit) or "1"}'
+            share = '' if s.first_order is None else f', share {s.first_order:6.1%}'
+            slope = f'{s.quantity:18}{s.slope:+11.4g} {per:16}'
+            lines.append(f'    {slope} {s.correlation:+.2f} sd per sd{share}')
+    return lines
+
+
+def _ellipse_document(ellipse: Ellipse) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        'centre_m': list(ellipse.centre),
+        'covariance_m2': _listed(ellipse.covariance),
+    }
+    for percent in ELLIPSES:
+        long, short, angle = ellipse.semi_axes(percent)
+        found[f'{percent}%'] = {
+            'semi_axes_m': [long, short],
+            'angle_left_of_x_deg': angle,
+            'landings_inside': ellipse.inside[percent],
+        }
+    return found
+
+
+def _listed(matrix: FloatArray) -> list[list[float]]:
+    found: list[list[float]] = matrix.tolist()
+    return found
+
+
+def _value(name: str, value: float) -> str:
+    q = quantity('name', name)
+    unit = f' {q.unit}' if q.unit else ''
+    return f'{name} {value:.6g}{unit}'
+
+
+def _told(name: str, values: str) -> str:
+    q = quantity('name', name)
+    unit = SHORT.get(q.unit, q.unit)
+    return f'{q.name.replace("_", " ")} {values} {unit}'.rstrip().replace(' °', '°')
+
+
+def _mean(question: Study, name: str, law: Normal) -> float:
+    mean = question.fixed(name) if law.mean is None else law.mean
+    return 0.0 if math.isclose(mean, 0.0, abs_tol=1e-300) else mean

@@ -1,0 +1,322 @@
+"""The question that an ensemble answers: what is thrown, what differs, and how it is drawn."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from disc_sim_ros import __version__, validation
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import ConfigError, brief
+from disc_sim_ros.physics import disc_file, flight, frames, theory
+from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.studies import sampling
+from disc_sim_ros.studies.columns import (
+    ADVANCE_RATIO,
+    CONTROL,
+    LAUNCH,
+    WIND,
+    Quantity,
+    fixed_property,
+    quantity,
+)
+from disc_sim_ros.studies.scatter import Normal, Uniform, correlation_factor, quantiles
+
+EACH, SAME = 'each', 'same'
+GUSTS = (EACH, SAME)
+MOST_FLIGHTS = 10**9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """Flights at every point of a grid, each with `count` samples of scatter.
+
+    Flight i is sample i mod count at grid point i div count, the last name of `vary` turning
+    fastest; sample k is the same at every grid point, so that points compare by themselves.
+
+    Attributes:
+        setup: Disc, model, air, wind and step.
+        launch: The release where nothing else is said.
+        control: Control inputs where nothing else is said; coefficients only.
+        advance_ratio: Spin as r c / (2 V) of each flight instead of `launch.spin`, or None.
+        vary: Values of each quantity of the grid; names as in `quantities.QUANTITIES`.
+        scatter: How each scattered quantity is drawn. A quantity may be in both: `Normal` without
+            a mean scatters around the grid.
+        correlations: Of pairs of scattered quantities, between -1 and 1; of their normal
+            scores, where a quantity is uniform. Pairs that are not named are 0.
+        count: Samples at each grid point.
+        seed: Of the scatter. The gusts begin with `setup.wind.seed`.
+        sampling: 'random' or 'sobol'.
+        gusts: 'each': sample k flies in the gusts of seed `setup.wind.seed` + k; 'same': all fly
+            in those of `setup.wind.seed`.
+        duration: Longest time of flight [s].
+        ground: End where the centre crosses z = 0.
+
+    Raises:
+        ConfigError: Something is out of range, or contradicts something else.
+    """
+
+    setup: flight.Setup
+    launch: Launch = field(default_factory=Launch)
+    control: Control = flight.NO_CONTROL
+    advance_ratio: float | None = None
+    vary: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    scatter: Mapping[str, Normal | Uniform] = field(default_factory=dict)
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    count: int = 1
+    seed: int = 0
+    sampling: str = sampling.RANDOM
+    gusts: str = EACH
+    duration: float = 60.0
+    ground: bool = True
+
+    def __post_init__(self) -> None:
+        validation.whole_number('count', self.count, 1, sampling.MOST_SAMPLES)
+        validation.whole_number('seed', self.seed, 0, 2**63 - 1)
+        validation.choice('sampling', self.sampling, sampling.METHODS)
+        validation.choice('gusts', self.gusts, GUSTS)
+        self._check_names()
+        self._check_kinds()
+        if self.size > MOST_FLIGHTS:
+            raise ConfigError('count', self.size, f'at most {MOST_FLIGHTS} flights altogether')
+        _ = self._factor
+        self._check_extremes()
+
+    @cached_property
+    def varied(self) -> tuple[Quantity, ...]:
+        """Return the quantities of the grid and then those that are only scattered."""
+        names = dict.fromkeys([*self.vary, *self.scatter])
+        return tuple(quantity('name', name) for name in names)
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Return the number of values of each quantity of the grid."""
+        return tuple(len(values) for values in self.vary.values())
+
+    @property
+    def points(self) -> int:
+        """Return the number of grid points; 1 without a grid."""
+        return math.prod(self.shape)
+
+    @property
+    def size(self) -> int:
+        """Return the number of flights."""
+        return self.points * self.count
+
+    @property
+    def gusts_differ(self) -> bool:
+        """Say whether each sample has gusts of its own."""
+        return self.setup.wind.turbulence > 0.0 and self.gusts == EACH
+
+    def values(self, start: int, stop: int) -> dict[str, FloatArray]:
+        """Return what differs in flights `start` to `stop`, each of shape (stop - start,)."""
+        index = np.arange(start, stop)
+        found: dict[str, FloatArray] = {}
+        if self.vary:
+            places = np.unravel_index(index // self.count, self.shape)
+            for (name, values), place in zip(self.vary.items(), places, strict=True):
+                found[name] = np.asarray(values, dtype=float)[place]
+        if self.scatter:
+            drawn = self._scores_of(index % self.count)
+            for j, (name, law) in enumerate(self.scatter.items()):
+                centre = found.get(name, self.fixed(name))
+                lowest, highest = self.bounds(name)
+                found[name] = quantiles(law, drawn[:, j], centre, lowest, highest)
+        return found
+
+    def scores(self, start: int, stop: int) -> FloatArray:
+        """Return the standard normal scores of samples, shape (stop - start, scattered)."""
+        unit = sampling.unit_samples(
+            self.sampling, len(self.scatter), self.seed, start, stop, count=self.count
+        )
+        scores: FloatArray = ndtri(unit)
+        if not self.correlations:
+            return scores
+        # Not a matrix product, whose last bit would depend on the number of rows.
+        mixed = np.zeros_like(scores)
+        for i, row in enumerate(self._factor):
+            for j in range(i + 1):
+                mixed[:, i] += row[j] * scores[:, j]
+        return mixed
+
+    def gust_seeds(self, start: int, stop: int) -> NDArray[np.int64] | None:
+        """Return the seeds of the gusts of flights `start` to `stop`; None if they do not differ.
+
+        `fly --seed` flies in the same gusts.
+        """
+        if not self.gusts_differ:
+            return None
+        return self.setup.wind.seed + np.arange(start, stop) % self.count
+
+    def fixed(self, name: str) -> float:
+        """Return the value of a quantity where it is neither varied nor scattered."""
+        if name in LAUNCH:
+            return float(getattr(self.launch, name))
+        if name in WIND:
+            return float(frames.map_from_paper(self.setup.wind.mean)[WIND.index(name)])
+        if name in CONTROL:
+            return float(self.control[CONTROL.index(name)])
+        if name == ADVANCE_RATIO:
+            return self.advance_ratio or 0.0
+        return fixed_property(self.setup, name)
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Return the least and the greatest value that a quantity can have in a flight."""
+        q = quantity('name', name)
+        return (0.0 if name == 'height' and self.ground else q.lowest), q.highest
+
+    @cached_property
+    def _factor(self) -> FloatArray:
+        return correlation_factor(tuple(self.scatter), self.correlations)
+
+    def _scores_of(self, sample: NDArray[np.int64]) -> FloatArray:
+        """Return the scores of samples, which ascend but for turns, shape (n, scattered)."""
+        turns = np.flatnonzero(np.diff(sample) < 0) + 1
+        if len(turns) > 1:  # every sample is among them
+            return self.scores(0, self.count)[sample]
+        pieces = [p for p in np.split(sample, turns) if len(p)]
+        return np.concatenate([self.scores(int(p[0]), int(p[-1]) + 1) for p in pieces])
+
+    def _check_names(self) -> None:
+        for thing, given in (('vary', list(self.vary)), ('scatter', list(self.scatter))):
+            for name in given:
+                if quantity(thing, name).name != name:
+                    raise ConfigError(thing, name, f'its name is {quantity(thing, name).name}')
+        both = [n for n in self.vary if n in self.scatter and not _is_around(self.scatter[n])]
+        if both:
+            allowed = 'it is varied already; scatter it with a standard deviation alone'
+            raise ConfigError('scatter', both[0], allowed)
+        names = {q.name for q in self.varied}
+        if 'spin' in names and (ADVANCE_RATIO in names or self.advance_ratio is not None):
+            raise ConfigError('spin', ADVANCE_RATIO, 'one of them gives the other, give one')
+        for name, values in self.vary.items():
+            if not len(values):
+                raise ConfigError(f'vary {name}', [], 'give at least one value')
+            if len(set(values)) < len(values):
+                raise ConfigError(f'vary {name}', list(values), 'a value is there twice')
+
+    def _check_kinds(self) -> None:
+        if self.sampling == sampling.SOBOL and not self.scatter:
+            raise ConfigError('sampling', 'sobol', 'nothing scatters; give what does')
+        if self.count > 1 and not self.scatter and not self.gusts_differ:
+            allowed = 'nothing differs from sample to sample; give scatter, or gusts that do'
+            raise ConfigError('count', self.count, allowed)
+        if self.gusts_differ and self.setup.wind.seed + self.count >= 2**63:
+            raise ConfigError('seed', self.setup.wind.seed, 'each sample needs a seed above it')
+
+    @cached_property
+    def fastest_spin(self) -> float:
+        """Return the greatest spin of a flight, of normal scatter at 6 standard deviations."""
+        ratio = self._largest(ADVANCE_RATIO)
+        if ratio == 0.0:
+            return self._largest('spin')
+        return theory.spin_rate(ratio, self.setup.disc.diameter, self._largest('speed'))
+
+    def _largest(self, name: str) -> float:
+        return max(abs(x) for x in self._ends(quantity('name', name)))
+
+    def _check_extremes(self) -> None:
+        """Refuse values out of range, and a step that is too long for the fastest flight."""
+        for q in self.varied:
+            self._ends(q)
+        spin = validation.number('spin', self.fastest_spin, 0.0, LIMITS['spin'][1], unit='rad/s')
+        height = min(self._ends(quantity('name', 'height')))
+        flight.check_flight(
+            replace(self.launch, spin=spin, speed=self._largest('speed'), height=height),
+            self.setup,
+            self.duration,
+            ground=self.ground,
+            sample_rate=0.0,
+        )
+        flight.checked_control(self.control)
+
+    def _ends(self, q: Quantity) -> tuple[float, ...]:
+        """Return the values between which a quantity lies, of scatter those of +-6 sd."""
+        lowest, highest = self.bounds(q.name)
+        values = [
+            validation.number(f'vary {q.name}', x, lowest, highest, unit=q.unit)
+            for x in self.vary.get(q.name, ())
+        ]
+        law = self.scatter.get(q.name)
+        if isinstance(law, Uniform):
+            ends = (law.low, law.high)
+            values += [validation.number(q.name, x, lowest, highest, unit=q.unit) for x in ends]
+        elif law is not None:
+            centres = values or [self.fixed(q.name) if law.mean is None else law.mean]
+            values = []
+            for centre in (min(centres), max(centres)):
+                validation.number(f'mean of {q.name}', centre, lowest, highest, unit=q.unit)
+                values += [max(centre - 6 * law.sd, lowest), min(centre + 6 * law.sd, highest)]
+        return tuple(values) or (self.fixed(q.name),)
+
+
+def _is_around(law: Normal | Uniform) -> bool:
+    return isinstance(law, Normal) and law.mean is None
+
+
+def study_document(question: Study) -> dict[str, Any]:
+    """Return all that decides the flights of a question; the disc as a disc file holds it.
+
+    Angles are in degrees, all else in SI units; wind is where the air moves to, in `map` axes.
+    """
+    setup = question.setup
+    names = (*LAUNCH, *WIND, *CONTROL)
+    fixed = {name: question.fixed(name) for name in names}
+    if question.advance_ratio is not None or ADVANCE_RATIO in question.vary:
+        fixed[ADVANCE_RATIO] = question.fixed(ADVANCE_RATIO)
+        del fixed['spin']
+    return {
+        'version': __version__,
+        'disc': setup.disc.name,
+        'disc_file': disc_file.disc_document(setup.disc),
+        'model': setup.model,
+        'aero': setup.aero or setup.disc.aero,
+        'moment_axes': setup.moment_axes,
+        'air_density': setup.air.density,
+        'gravity': setup.air.gravity,
+        'roughness_length': setup.wind.roughness_length,
+        'reference_height': setup.wind.reference_height,
+        'turbulence': setup.wind.turbulence,
+        'gust_seed': setup.wind.seed,
+        'gust_seeds': question.gusts,
+        'step': setup.step,
+        'duration': question.duration,
+        'ground': question.ground,
+        'fixed': fixed,
+        'vary': {name: [float(x) for x in values] for name, values in question.vary.items()},
+        'scatter': {
+            name: {'normal': [law.mean, law.sd]}
+            if isinstance(law, Normal)
+            else {'uniform': [law.low, law.high]}
+            for name, law in question.scatter.items()
+        },
+        'correlations': {f'{a},{b}': r for (a, b), r in question.correlations.items()},
+        'count': question.count,
+        'seed': question.seed,
+        'sampling': question.sampling,
+    }
+
+
+def study_differences(
+    old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = ''
+) -> list[str]:
+    """Return what differs between two documents, each as 'name OLD, now NEW'."""
+    found: list[str] = []
+    for key in dict.fromkeys([*old, *new]):
+        before, after = old.get(key), new.get(key)
+        if isinstance(before, dict) and isinstance(after, dict):
+            within = '' if key == 'fixed' else f'{key} '
+            found += study_differences(before, after, f'{prefix}{within}')
+        elif before != after:
+            found.append(f'{prefix}{key} {_shown(before)}, now {_shown(after)}')
+    return found
+
+
+def _shown(value: object) -> str:
+    return 'not given' if value is None else brief(value)

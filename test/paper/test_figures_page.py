@@ -1,0 +1,92 @@
+"""docs/figures.md says what the figures give."""
+
+from pathlib import Path
+import re
+
+from PIL import Image
+import pytest
+
+from disc_sim_ros.paper import (
+    conditions,
+    crosscheck,
+    fig04_flight_f2302,
+    fig10_similarity,
+    figure_files,
+    report,
+    style,
+)
+from disc_sim_ros.paper import fig11_spiral_turn as fig11
+from disc_sim_ros.paper.conditions import PRINTED, TENTH
+from paper.computed_figures import FIGURES, computed, judged
+
+pytestmark = pytest.mark.xdist_group('figures')  # computed once
+
+DOCS = Path(__file__).parents[2] / 'docs'
+PAGE = (DOCS / 'figures.md').read_text(encoding='utf-8')
+
+
+def row(what):
+    return next(line for line in PAGE.splitlines() if line.startswith(f'| {what}'))
+
+
+def test_the_verdicts_are_those_of_the_table():
+    found = report.Report((), judged(), dark=True)
+    for sentence in found.summary():
+        assert sentence in PAGE
+
+
+def test_the_rows_are_what_the_figures_give():
+    """Each number of the page, as rounded there."""
+    printed, corrected = computed('4').printed[1], computed('4').corrected[1]
+    for curve in (printed, corrected):
+        assert f'{fig04_flight_f2302.wobble(curve):.1f}°' in row('Fig. 4')
+
+    t = computed('5').curves[0].t
+    assert f'{t.airspeed.min():.2f} m/s' in row('Fig. 5')
+    assert f'{conditions.quantities(t)["alpha_deg"].max():.1f}°' in row('Fig. 5')
+
+    flights = computed('7')
+    assert f'| {flights.best(flights.range[0]):g}°; of ten points 10° |' in row('Fig. 7')
+    assert f'| {flights.best(flights.duration[0]):g}°; of ten points 10° |' in row('Fig. 8')
+    assert flights.best(flights.duration[0], 10.0) == flights.best(flights.range[0], 10.0) == 10.0
+
+    rolls = [computed('9').crossing(r, s) for r in (0.2, 0.25, 0.29) for s in conditions.SHARES]
+    assert f'{min(rolls):.1f} to {max(rolls):.1f}°' in row('Fig. 9')
+    plates = computed('10')
+    assert max(fig10_similarity.spread(p) for p in (plates.first, plates.second)) < 0.002
+
+    as_printed, tenth = computed('11').curves[:2]
+    for curve in (as_printed, tenth):
+        alpha, speed = fig11.mean(curve, 'alpha_deg'), fig11.mean(curve, 'V_m_s')
+        assert f'{alpha:.1f}°, {speed:.1f} m/s' in row('Fig. 11')
+    depths = {c.value: c.flight.end.Z for c in computed('12').curves if c.share == PRINTED}
+    assert f'{depths[0.0]:.1f} m without gravity, {depths[9.81]:.1f} m with' in row('Fig. 12')
+
+
+def test_fig_5_is_met_with_the_damping_that_the_page_says():
+    results = [r for r in judged() if r.statement.says == 'rms of alpha from the black curve']
+    assert dict(zip(conditions.SHARES, results[0].met, strict=True)) == {
+        PRINTED: False,
+        TENTH: True,
+    }
+
+
+def test_the_second_integration_is_as_close_as_the_page_says():
+    limit = float(re.search(r'at most ([\d.]+) mm', PAGE)[1]) * 1e-3
+    for key in ('4', 'models', '12'):  # the three farthest, all with a wobble
+        flight = FIGURES[key].example(computed(key)).flight
+        assert crosscheck.largest_distance(flight) < limit
+
+
+@pytest.mark.parametrize('key', ['5', '6', 'roll_rate'])
+@pytest.mark.parametrize('look', style.LOOKS.values(), ids=style.LOOKS)
+def test_the_pictures_are_those_of_the_program(key, look):
+    name = figure_files.picture(key, 'png', look)
+    assert f'figures/{name}' in PAGE
+    kept = DOCS / 'figures' / name
+    assert kept.stat().st_size < 200_000
+    with Image.open(kept) as picture:
+        size = picture.size
+    figure = FIGURES[key].plot(computed(key), look)
+    width, height = figure.get_size_inches() * style.DPI
+    assert size == (round(width), round(height))

@@ -1,0 +1,111 @@
+"""A recorder in a process of its own, and topics of counted messages to record."""
+
+from collections.abc import Mapping
+import itertools
+from pathlib import Path
+import signal
+import struct
+import subprocess
+import sys
+import time
+
+import pytest
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int64
+
+from disc_sim_ros.bags.reader import open_bag
+from ros.sim_process import DEADLINE, Harness
+
+RELIABLE = QoSProfile(depth=20_000)
+_MAIN = 'from disc_sim_ros.cli.recorder_node import main\nsys.exit(main())'
+COUNT = struct.Struct('<4xq')  # a serialised std_msgs/Int64
+
+
+class Recorder:
+    """A `recorder_node` in a process of its own, ended with the test.
+
+    Attributes:
+        bag: Its folder.
+        process: The process.
+    """
+
+    def __init__(
+        self, ros: Harness, bag: Path, parameters: Mapping[str, object], before: str = ''
+    ) -> None:
+        """Start it; `before` is Python to run in its process first."""
+        self.bag = bag
+        self._ros = ros
+        self._log = bag.with_name(f'{bag.name}.log')
+        program = f'import sys\n{before}\n{_MAIN}'
+        command = [sys.executable, '-c', program, '--ros-args']
+        for name, value in {'bag': bag, **parameters}.items():
+            text = str(value).lower() if isinstance(value, bool) else value
+            command += ['-p', f'{name}:={text}']
+        with self._log.open('wb') as log:
+            self.process = subprocess.Popen(command, stdout=log, stderr=log)
+
+    @property
+    def said(self) -> str:
+        return self._log.read_text()
+
+    def wait_for(self, text: str) -> None:
+        """Wait until it has said something."""
+        self._ros.spin_until(lambda: text in self.said, f'{text!r} in: {self.said}')
+
+    def listens_to(self, *names: str) -> None:
+        """Wait until it has subscribed to topics."""
+        self.wait_for('recording')
+        for name in names:
+            self._ros.spin_until(lambda n=name: n in self._recorded(), f'{name} recorded')
+
+    def _recorded(self) -> set[str]:
+        lines = [
+            line for line in self.said.splitlines() if '] [recorder_node]: recording /' in line
+        ]
+        return {n for line in lines for n in line.split(': recording ')[1].split(', ')}
+
+    def wait(self) -> int:
+        try:
+            return self.process.wait(DEADLINE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            pytest.fail(f'the recorder did not end within {DEADLINE:g} s:\n{self.said}')
+
+    def end(self, number: signal.Signals = signal.SIGINT) -> int:
+        self.process.send_signal(number)
+        return self.wait()
+
+
+class Counter:
+    """Publishes 0, 1, 2, ... on a topic, and knows when each was sent."""
+
+    def __init__(self, ros: Harness, topic: str, qos: QoSProfile = RELIABLE) -> None:
+        self.topic = topic
+        self.sent: list[float] = []  # when, by the monotonic clock
+        self._publisher = ros.node.create_publisher(Int64, topic, qos)
+        self._ros = ros
+
+    def heard_by(self, count: int) -> None:
+        """Wait until some subscriptions are matched."""
+        self._ros.spin_until(
+            lambda: self._publisher.get_subscription_count() >= count, f'{self.topic} heard'
+        )
+
+    def publish(self, count: int, rate: float = 2000.0) -> None:
+        """Publish messages, so many a second at most."""
+        begun = time.monotonic()
+        for n in itertools.count():
+            if n == count:
+                return
+            time.sleep(max(begun + n / rate - time.monotonic(), 0.0))
+            self.publish_one()
+
+    def publish_one(self) -> None:
+        self._publisher.publish(Int64(data=len(self.sent)))
+        self.sent.append(time.monotonic())
+
+
+def counts(bag: Path, topic: str) -> list[int]:
+    """Return the counted messages of a topic in a bag, in their order there."""
+    return [COUNT.unpack(message.data)[0] for message in open_bag(bag).raw([topic])]

@@ -1,0 +1,224 @@
+"""Simulators in processes of their own, and a node in the test's process that talks to them."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+import pytest
+from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from std_srvs.srv import SetBool, Trigger
+
+DEADLINE = 60.0  # s of wall time for what takes less than one on an idle machine
+ALL_QOS = QoSProfile(depth=100_000)  # reliable: a test that is slow to listen loses nothing
+
+
+class SimProcess:
+    """A `sim_node` in a process of its own.
+
+    Attributes:
+        name: Its node name with namespace, such as '/red/sim_node'.
+        process: The process.
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, object], arguments: tuple[str, ...], name: str, stderr: Path
+    ) -> None:
+        command = [sys.executable, '-m', 'disc_sim_ros.ros.sim.node', '--ros-args']
+        for key, value in parameters.items():
+            command += ['-p', f'{key}:={str(value).lower() if isinstance(value, bool) else value}']
+        self.name = name
+        self._stderr = stderr
+        with stderr.open('wb') as file:
+            self.process = subprocess.Popen([*command, *arguments], stdout=file, stderr=file)
+
+    @property
+    def stderr(self) -> str:
+        """What it has written so far, to stdout as well."""
+        return self._stderr.read_text()
+
+    def wait(self) -> int:
+        """Wait for the end and return the exit code."""
+        try:
+            return self.process.wait(DEADLINE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            pytest.fail(f'{self.name} did not end within {DEADLINE:g} s:\n{self.stderr}')
+
+    def end(self, number: signal.Signals = signal.SIGINT) -> int:
+        """Send a signal, wait for the end and return the exit code."""
+        self.process.send_signal(number)
+        return self.wait()
+
+
+class Harness:
+    """A node in the test's process, and the simulators that it has started.
+
+    At the end of its `with` block the simulators that still run get SIGINT and must end with 0.
+
+    Attributes:
+        node: A node to make more with.
+        sims: What has been started.
+    """
+
+    def __init__(self, context: Context, folder: Path) -> None:
+        self.node = Node('harness', context=context, start_parameter_services=False)
+        self.sims: list[SimProcess] = []
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+        self._folder = folder
+        self._clients: dict[str, Client] = {}
+        self._parameters: dict[SimProcess, AsyncParameterClient] = {}
+        self._reached: set[str] = set()  # names of simulators that know all that was made
+        self._heard: list[list[Any]] = []
+        self._since = 0
+
+    def __enter__(self) -> 'Harness':
+        return self
+
+    def __exit__(self, error: object, *_: object) -> None:
+        running = [sim for sim in self.sims if sim.process.poll() is None]
+        for sim in running:
+            sim.process.send_signal(signal.SIGINT)
+        codes = {sim.name: sim.wait() for sim in running}
+        self._executor.shutdown()
+        self.node.destroy_node()
+        if error is None:
+            assert not any(codes.values()), f'{codes}\n{self._outputs()}'
+
+    def start(
+        self, parameters: Mapping[str, object], *arguments: str, namespace: str = ''
+    ) -> SimProcess:
+        """Start a simulator with parameters and more arguments of ROS; do not wait for it."""
+        if namespace:
+            arguments += ('-r', f'__ns:={namespace}')
+        stderr = self._folder / f'sim_{len(self.sims)}.txt'
+        sim = SimProcess(parameters, arguments, f'{namespace}/sim_node', stderr)
+        self.sims.append(sim)
+        self._client(sim, 'pause', SetBool)
+        for service in ('throw', 'reset', 'step'):
+            self._client(sim, service, Trigger)
+        self._parameters[sim] = AsyncParameterClient(self.node, sim.name)
+        return sim
+
+    def spin_until(
+        self, condition: Callable[[], Any], what: str = '', deadline: float = DEADLINE
+    ) -> None:
+        """Take messages until a condition holds; fail after `deadline` [s] of wall time."""
+        end = time.monotonic() + deadline
+        while not condition():
+            if time.monotonic() > end:
+                pytest.fail(f'not within {deadline:g} s: {what or condition}\n{self._outputs()}')
+            self._executor.spin_once(0.02)
+
+    def listen(
+        self, kind: type, topic: str, *, raw: bool = False, qos: QoSProfile = ALL_QOS
+    ) -> list[Any]:
+        """Return a list to which every message of a topic will be added, as bytes where `raw`."""
+        heard: list[Any] = []
+
+        def hear(message: Any, info: Mapping[str, int]) -> None:
+            if info['source_timestamp'] > self._since:
+                heard.append(message)
+
+        self.node.create_subscription(kind, topic, hear, qos, raw=raw)
+        self._heard.append(heard)
+        self._reached.clear()
+        return heard
+
+    def forget(self) -> None:
+        """Drop all that was published until now, also what is still on its way."""
+        self._since = time.time_ns()
+        for heard in self._heard:
+            heard.clear()
+
+    def publisher(self, kind: type, topic: str) -> Publisher:
+        """Return a publisher that a simulator has subscribed to."""
+        publisher = self.node.create_publisher(kind, topic, 1000)
+        self._reached.clear()
+        self.spin_until(publisher.get_subscription_count, f'a subscriber of {topic}')
+        return publisher
+
+    def send(self, sim: SimProcess, publisher: Publisher, *messages: Any) -> None:
+        """Publish messages to a simulator and wait until they are there."""
+        self._reach(sim)
+        self.spin_until(publisher.get_subscription_count, f'a subscriber of {publisher.topic}')
+        for message in messages:
+            publisher.publish(message)
+        # What is sent later arrives later. To wait for DDS to acknowledge takes 3 s.
+        self._result(sim, self._parameters[sim].get_parameters(['use_sim_time']))
+
+    def call(self, sim: SimProcess, service: str, kind: type = Trigger, **fields: Any) -> Any:
+        """Call a service of a simulator, such as 'throw', and return the response."""
+        client = self._client(sim, service, kind)
+        self._reach(sim)
+        self.spin_until(client.service_is_ready, f'the service {client.srv_name}')
+        return self._result(sim, client.call_async(kind.Request(**fields)))
+
+    def pause(self, sim: SimProcess, *, still: bool = True) -> None:
+        """Let the time of a simulator stand still, or go on."""
+        assert self.call(sim, 'pause', SetBool, data=still).success
+
+    def set(self, sim: SimProcess, parameters: Mapping[str, object]) -> Any:
+        """Set parameters of a simulator together; return rcl_interfaces/SetParametersResult."""
+        client = self._parameters[sim]
+        self._reach(sim)
+        self.spin_until(client.services_are_ready, f'the parameters of {sim.name}')
+        changes = [Parameter(key, value=x).to_parameter_msg() for key, x in parameters.items()]
+        return self._result(sim, client.set_parameters_atomically(changes)).result
+
+    def _client(self, sim: SimProcess, service: str, kind: type) -> Client:
+        name = f'{sim.name}/{service}'
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+            self._reached.discard(sim.name)
+        return self._clients[name]
+
+    def _reach(self, sim: SimProcess) -> None:
+        """Wait until a simulator knows all that has been made here so far.
+
+        It publishes to no subscription, and answers no client, that it does not know yet, and a
+        first command takes its time. Discovery keeps their order: when it has answered the
+        youngest client, it knows all that is older.
+        """
+        if sim.name in self._reached:
+            return
+        client = self.node.create_client(GetParameters, f'{sim.name}/get_parameters')
+        answers: list[Future] = []
+
+        def answered() -> bool:
+            return any(answer.done() for answer in answers)
+
+        def asked() -> bool:
+            answers.append(client.call_async(GetParameters.Request()))
+            patience = time.monotonic() + 0.2
+            while not answered() and time.monotonic() < patience:
+                self._executor.spin_once(0.02)
+            return answered()
+
+        self.spin_until(client.service_is_ready, f'the service {client.srv_name}')
+        self.spin_until(asked, f'an answer of {sim.name}')
+        self.node.destroy_client(client)
+        self._reached.add(sim.name)
+
+    def _result(self, sim: SimProcess, future: Future) -> Any:
+        self.spin_until(future.done, f'an answer of {sim.name}')
+        return future.result()
+
+    def _outputs(self) -> str:
+        return '\n'.join(
+            f'{sim.name} (code {sim.process.poll()}): {sim.stderr}' for sim in self.sims
+        )

@@ -1,0 +1,116 @@
+"""Parameters of recorder_node and its choice of topics, without ROS."""
+
+from pathlib import Path
+import re
+import sys
+
+import pytest
+import yaml
+
+pytest.importorskip('rclpy')
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.ros import parameter_pages
+from disc_sim_ros.ros.recorder.options import RECORDER_TABLE, Selection, recorder_config
+from disc_sim_ros.ros.recorder.qos import adapt_request_to_offers
+from disc_sim_ros.ros.recorder.topic_recorder import message_type
+
+
+@pytest.mark.parametrize(
+    ('values', 'taken', 'left'),
+    [
+        ({}, ['/odom', '/red/odom'], ['/_hidden', '/red/_hidden/x']),
+        ({'topics': 'odom /pose'}, ['/red/odom', '/pose'], ['/odom', '/red/pose']),
+        ({'topics': ['odom', '/_x']}, ['/red/odom', '/_x'], ['/pose']),
+        ({'regex': '/red/.*'}, ['/red/odom'], ['/odom', '/blue/red/odom', '/red/_x']),
+        ({'topics': '/pose', 'regex': '/o.*'}, ['/pose', '/odom'], ['/imu']),
+        ({'exclude': '/rosout|/o.*'}, ['/pose'], ['/rosout', '/odom']),
+        ({'topics': '/odom', 'exclude': '/odom'}, [], ['/odom', '/pose']),
+    ],
+)
+def test_topics_are_chosen_as_rosbag2_does(values, taken, left):
+    selection = recorder_config(values, '/red').selection
+    assert [name for name in [*taken, *left] if selection.takes(name)] == taken
+
+
+def test_defaults_are_allowed_and_mean_no_limits():
+    config = recorder_config({entry.name: entry.default for entry in RECORDER_TABLE})
+    assert (config.max_size, config.max_duration, config.flush_period) == (None, None, 0.5)
+    assert re.fullmatch(r'bags/disc_\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d', str(config.bag))
+    assert config.selection == Selection()
+    assert recorder_config({'max_size_mib': 3}).max_size == 3 * 2**20
+
+
+@pytest.mark.parametrize(
+    'values',
+    [
+        {'topics': 'a//b'},
+        {'exclude': '['},
+        {'flush_period': 0.0},
+        {'max_size_mib': -1},
+        {'bga': ''},
+    ],
+)
+def test_what_is_impossible_is_refused_by_name(values):
+    with pytest.raises(ConfigError, match=next(iter(values))):
+        recorder_config(values)
+
+
+def offer(*, reliable: bool, latched: bool) -> QoSProfile:
+    return QoSProfile(
+        depth=1,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
+    )
+
+
+def test_a_request_is_met_by_every_offer():
+    best, least = offer(reliable=True, latched=True), offer(reliable=False, latched=False)
+    assert adapt_request_to_offers([best]).reliability == ReliabilityPolicy.RELIABLE
+    assert adapt_request_to_offers([best]).durability == DurabilityPolicy.TRANSIENT_LOCAL
+    for offers in ([best, least], [least]):
+        assert adapt_request_to_offers(offers).reliability == ReliabilityPolicy.BEST_EFFORT
+        assert adapt_request_to_offers(offers).durability == DurabilityPolicy.VOLATILE
+
+
+@pytest.mark.parametrize(
+    'name',
+    [
+        'no_such_msgs/msg/Thing',
+        'nav_msgs/msg/NoSuch',
+        'nav_msgs/msg/msg',
+        'nonsense',
+        '/x/y',
+        '../msg/X',
+        'std_msgs/msg/Int64\n',
+        'antigravity/msg/X',
+        'wsgiref/simple_server/WSGIServer',
+    ],
+)
+def test_a_name_that_is_not_of_an_installed_type_is_an_import_error(name):
+    with pytest.raises(ImportError):
+        message_type(name)
+    assert 'wsgiref.simple_server' not in sys.modules  # names from the network run no code
+
+
+def test_everything_is_what_nobody_chose():
+    assert recorder_config({'exclude': '/rosout'}).selection.everything
+    assert not recorder_config({'topics': '/odom'}).selection.everything
+    assert not recorder_config({'regex': '/.*'}).selection.everything
+
+
+@pytest.mark.parametrize(
+    ('page', 'file'), [('recorder', 'docs/recorder.md'), ('recorder_yaml', 'config/recorder.yaml')]
+)
+def test_pages_are_made_of_the_table(page, file):
+    text = (Path(__file__).parents[2] / file).read_text(encoding='utf-8')
+    command = f'python tools/parameter_pages.py {page} > {file}'
+    assert text == parameter_pages.PAGES[page](), f'run: {command}'
+
+
+def test_the_file_holds_every_parameter_with_its_default():
+    document = yaml.safe_load(parameter_pages.recorder_yaml_file())
+    expected = {entry.name: entry.default for entry in RECORDER_TABLE}
+    assert document == {'/**': {'ros__parameters': expected}}
