@@ -7,13 +7,14 @@ import os
 import pytest
 import yaml
 
+import parameter_pages
+
 pytest.importorskip('rclpy')
 
 
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.launch import LIMITS, Launch
-from disc_sim_ros.ros import parameter_pages
 from disc_sim_ros.ros.parameter_spec import ParameterSpec
 from disc_sim_ros.ros.sim.config import configuration
 from disc_sim_ros.ros.sim.parameters import TABLE

@@ -7,12 +7,13 @@ import sys
 import pytest
 import yaml
 
+import parameter_pages
+
 pytest.importorskip('rclpy')
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.ros import parameter_pages
 from disc_sim_ros.ros.recorder.options import RECORDER_TABLE, Selection, recorder_config
 from disc_sim_ros.ros.recorder.qos import adapt_request_to_offers
 from disc_sim_ros.ros.recorder.topic_recorder import message_type
