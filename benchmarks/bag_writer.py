@@ -21,8 +21,7 @@ from rclpy.serialization import serialize_message
 
 from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.mcap_writer import CHUNK_SIZE
-from disc_sim_ros.bags.qos import Qos
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Qos, Topic
 from disc_sim_ros.bags.writer import BagWriter
 from lines import Line, number, print_lines
 

@@ -9,10 +9,9 @@ import mcap_bytes
 import scratch
 
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.qos import Qos
 from disc_sim_ros.bags.reader import Bag, open_bag
 from disc_sim_ros.bags.repair import repair
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Qos, Topic
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import BagError
 

@@ -34,8 +34,8 @@ from mcap.writer import LIBRARY_IDENTIFIER, MCAP0_MAGIC
 import zstandard
 
 from disc_sim_ros import __version__, files
-from disc_sim_ros.bags import qos, schemas
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags import schemas
+from disc_sim_ros.bags.topic import Topic, qos_yaml
 from disc_sim_ros.errors import BagError
 
 CHUNK_SIZE = 768 * 1024  # bytes before compression, as the C++ library
@@ -65,7 +65,7 @@ class Definition:
             topic=topic.name,
             message_encoding=topic.serialization_format,
             metadata={
-                'offered_qos_profiles': qos.yaml_list(topic.qos),
+                'offered_qos_profiles': qos_yaml(topic.qos),
                 'topic_type_hash': topic.type_hash,
                 **dict(topic.extra),
             },

@@ -7,8 +7,7 @@ from typing import Any
 
 import yaml
 
-from disc_sim_ros.bags import qos
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Topic, qos_profiles, qos_yaml
 from disc_sim_ros.errors import BagError
 
 FILE_NAME = 'metadata.yaml'
@@ -145,7 +144,7 @@ def _block(key: str, items: list[list[str]]) -> list[str]:
 
 def _topic(info: TopicInfo) -> list[str]:
     topic = info.topic
-    profiles = qos.yaml_list(topic.qos)
+    profiles = qos_yaml(topic.qos)
     offered = (
         [f'  offered_qos_profiles: {profiles}']
         if profiles == '[]'
@@ -177,7 +176,7 @@ def _file(info: FileInfo) -> list[str]:
 def _parsed_topic(item: Any) -> TopicInfo:
     about = item['topic_metadata']
     try:
-        profiles = qos.from_items(about.get('offered_qos_profiles') or [])
+        profiles = qos_profiles(about.get('offered_qos_profiles') or [])
     except BagError:
         profiles = ()
     return TopicInfo(

@@ -14,7 +14,7 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from disc_sim_ros.bags import metadata, qos, schemas
+from disc_sim_ros.bags import metadata, schemas
 from disc_sim_ros.bags.mcap_reader import indexed
 from disc_sim_ros.bags.mcap_records import (
     Chunk,
@@ -26,7 +26,7 @@ from disc_sim_ros.bags.mcap_records import (
 )
 from disc_sim_ros.bags.mcap_recovery import scanned
 from disc_sim_ros.bags.metadata import BagMetadata, TopicInfo
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Topic, parse_qos
 from disc_sim_ros.errors import BagError, DamageError, brief
 from disc_sim_ros.files import reason
 
@@ -273,7 +273,7 @@ def topic_of(contents: Contents, channel: Channel) -> Topic:
     about = dict(channel.metadata)
     offered = about.get('offered_qos_profiles', '')
     try:
-        profiles = qos.parse(offered) if offered else ()
+        profiles = parse_qos(offered) if offered else ()
         about.pop('offered_qos_profiles', None)
     except BagError:
         profiles = ()  # kept as it is, among the extra

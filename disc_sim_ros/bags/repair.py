@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-import secrets
-import shutil
 from typing import Any
 
 from mcap.records import Channel
@@ -17,7 +15,7 @@ from disc_sim_ros.bags.reader import contents_of, mcap_files, told_by, topic_of
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import BagError, ConfigError, DamageError, WriteError
-from disc_sim_ros.files import reason, sync_folder
+from disc_sim_ros.files import check_new_folder, reason, whole_folder
 
 _FLUSH_PERIOD = 30.0  # s: what is made can be made again
 
@@ -125,10 +123,7 @@ def repair(
 def _check(source: Path, target: Path) -> None:
     if not source.exists():
         raise ConfigError('IN', str(source), 'there is no such bag')
-    if target.exists() or target.is_symlink():
-        raise ConfigError('OUT', str(target), 'it exists already, and is never overwritten')
-    if not target.name or target.name == '..':
-        raise ConfigError('OUT', str(target), 'give the name of a new folder')
+    check_new_folder('OUT', target)
     if source.is_dir() and target.resolve().is_relative_to(source.resolve()):
         raise ConfigError('OUT', str(target), f'it must not lie in {source}')
 
@@ -142,24 +137,12 @@ def _write(
 ) -> RepairReport:
     """Write what was found into a folder beside the target, which then gets its name."""
     about = told_by(found, told)
-    # The name is kept from here on: files inside are named after the bag.
-    shelter = target.absolute().parent / f'.{secrets.token_hex(8)}.part'
     try:
-        shelter.mkdir(parents=True)
-    except OSError as error:
-        why = f'the folder cannot be made ({reason(error)})'
-        raise ConfigError('OUT', str(target), why) from None
-    try:
-        made = shelter / target.name
-        kept, attached, losses = _copy(found, about, made, progress)
-        _check(source, target)  # again: some time has passed
-        made.rename(target)
-        sync_folder(target.absolute().parent)
+        with whole_folder('OUT', target) as made:  # files inside are named after the bag
+            kept, attached, losses = _copy(found, about, made, progress)
     except WriteError as error:
         why = f'{target}: cannot be written ({error.reason}); nothing is left of it'
         raise BagError(why) from None
-    finally:
-        shutil.rmtree(shelter, ignore_errors=True)
     count = sum(c.message_count for c in found)
     whole = source.is_file() if told is None else told.message_count == count
     return RepairReport(

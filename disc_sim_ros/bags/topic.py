@@ -1,8 +1,59 @@
-"""What a bag says of a topic."""
+"""Topics as a bag describes them, with the quality of service of their publishers."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from disc_sim_ros.bags.qos import Qos
+import yaml
+
+from disc_sim_ros.errors import BagError
+
+# The C one is many times faster; not every build of PyYAML has it.
+LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+INFINITE = 9223372036854775807  # ns: 9223372036 s and 854775807 ns, rmw's RMW_DURATION_INFINITE
+_SECOND = 1_000_000_000  # ns
+_FOXY_INFINITE = ((2147483647, 4294967295), (2147483647, 2147483647))  # sec, nsec in old bags
+
+# rmw/types.h: the place of a word is its number; bags before Jazzy hold numbers.
+HISTORY = ('system_default', 'keep_last', 'keep_all', 'unknown')
+RELIABILITY = ('system_default', 'reliable', 'best_effort', 'unknown', 'best_available')
+DURABILITY = ('system_default', 'transient_local', 'volatile', 'unknown', 'best_available')
+LIVELINESS = (
+    'system_default',
+    'automatic',
+    'manual_by_node',
+    'manual_by_topic',
+    'unknown',
+    'best_available',
+)
+_WORDS = {
+    'history': HISTORY,
+    'reliability': RELIABILITY,
+    'durability': DURABILITY,
+    'liveliness': LIVELINESS,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Qos:
+    """One offered profile. Durations are whole nanoseconds, `INFINITE` for none."""
+
+    history: str = 'keep_last'
+    depth: int = 10
+    reliability: str = 'reliable'
+    durability: str = 'volatile'
+    deadline: int = INFINITE
+    lifespan: int = INFINITE
+    liveliness: str = 'automatic'
+    liveliness_lease_duration: int = INFINITE
+    avoid_ros_namespace_conventions: bool = False
+
+    def __post_init__(self) -> None:
+        for name, words in _WORDS.items():
+            if getattr(self, name) not in words:
+                raise BagError(
+                    f'QoS {name} {getattr(self, name)!r} is unknown; known are {", ".join(words)}'
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,3 +68,77 @@ class Topic:
     serialization_format: str = 'cdr'
     definition_encoding: str = 'ros2msg'  # or 'ros2idl', in bags of others
     extra: tuple[tuple[str, str], ...] = ()  # further channel metadata, in bags of others
+
+
+def qos_yaml(profiles: Iterable[Qos]) -> str:
+    """Return profiles as the YAML list that rosbag2 Jazzy keeps; `[]` for none."""
+    return '\n'.join('\n'.join(_item(profile)) for profile in profiles) or '[]'
+
+
+def parse_qos(text: str) -> tuple[Qos, ...]:
+    """Return the profiles of a YAML list, also of the older ones with numbers for words.
+
+    Raises:
+        BagError: It is no such list.
+    """
+    try:
+        return qos_profiles(yaml.load(text, Loader=LOADER) or [])  # noqa: S506 - a safe one
+    except yaml.YAMLError as error:
+        raise BagError(f'QoS is no YAML ({" ".join(str(error).split())})') from None
+
+
+def qos_profiles(items: Any) -> tuple[Qos, ...]:
+    """Return the profiles of a list of mappings, as metadata.yaml holds it."""
+    if isinstance(items, str):  # before version 9: YAML in YAML
+        return parse_qos(items)
+    if not isinstance(items, list):
+        raise BagError('QoS is no list of profiles')
+    return tuple(_profile(item) for item in items)
+
+
+def _item(qos: Qos) -> list[str]:
+    return [
+        f'- history: {qos.history}',
+        f'  depth: {qos.depth}',
+        f'  reliability: {qos.reliability}',
+        f'  durability: {qos.durability}',
+        *_time('deadline', qos.deadline),
+        *_time('lifespan', qos.lifespan),
+        f'  liveliness: {qos.liveliness}',
+        *_time('liveliness_lease_duration', qos.liveliness_lease_duration),
+        f'  avoid_ros_namespace_conventions: {str(qos.avoid_ros_namespace_conventions).lower()}',
+    ]
+
+
+def _time(name: str, nanoseconds: int) -> list[str]:
+    sec, nsec = divmod(nanoseconds, _SECOND)
+    return [f'  {name}:', f'    sec: {sec}', f'    nsec: {nsec}']
+
+
+def _profile(item: Any) -> Qos:
+    if not isinstance(item, Mapping):
+        raise BagError('a QoS profile is no mapping')
+    try:
+        return Qos(
+            depth=int(item['depth']),
+            deadline=_nanoseconds(item['deadline']),
+            lifespan=_nanoseconds(item['lifespan']),
+            liveliness_lease_duration=_nanoseconds(item['liveliness_lease_duration']),
+            avoid_ros_namespace_conventions=bool(item['avoid_ros_namespace_conventions']),
+            **{name: _word(item[name], words) for name, words in _WORDS.items()},
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise BagError(f'a QoS profile lacks or misstates {error}') from None
+
+
+def _word(value: Any, words: tuple[str, ...]) -> str:
+    if isinstance(value, int):
+        return words[value] if 0 <= value < len(words) else 'unknown'
+    return value if value in words else 'unknown'
+
+
+def _nanoseconds(time: Any) -> int:
+    sec, nsec = int(time['sec']), int(time['nsec'])
+    if (sec, nsec) in _FOXY_INFINITE:
+        return INFINITE
+    return min(sec * _SECOND + nsec, INFINITE)

@@ -11,7 +11,6 @@ from typing import Self
 
 from disc_sim_ros import files, validation
 from disc_sim_ros.bags import metadata
-from disc_sim_ros.bags.ledger import Ledger
 from disc_sim_ros.bags.mcap_writer import (
     CHUNK_SIZE,
     COMPRESSIONS,
@@ -19,6 +18,7 @@ from disc_sim_ros.bags.mcap_writer import (
     McapFile,
     new_attachment,
 )
+from disc_sim_ros.bags.metadata_builder import MetadataBuilder
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.errors import BagError, WriteError
 
@@ -70,11 +70,13 @@ class BagWriter:
         if max_duration is not None:
             seconds = validation.number('max_duration', max_duration, 1e-3, 1e9, unit='s')
             self._max_duration = round(seconds * 1e9)
-        self.folder = files.new_folder(Path(folder))
+        self.folder = files.new_folder('bag', Path(folder))
         self.lost = 0  # messages that a full disk cost
         self.flushed = 0  # messages that the disk has
         self._compression = compression
-        self._ledger = Ledger(ros_distro, {str(k): str(v) for k, v in custom_data.items()})
+        self._metadata = MetadataBuilder(
+            ros_distro, {str(k): str(v) for k, v in custom_data.items()}
+        )
         self._writable: dict[int, Definition] = {}  # by topic id; empty once writing is over
         self._failure: BagError | None = None
         self._closed = False
@@ -99,16 +101,16 @@ class BagWriter:
     def add(self, topic: Topic) -> int:
         """Announce a topic; return the id with which its messages are written."""
         self._refuse_when_over()
-        if len(self._ledger.topics) == _MOST_CHANNELS:
+        if len(self._metadata.topics) == _MOST_CHANNELS:
             raise BagError(f'{self.folder}: a bag has at most {_MOST_CHANNELS} topics')
-        topic_id = len(self._ledger.topics) + 1
+        topic_id = len(self._metadata.topics) + 1
         self._set(topic_id, topic)
         return topic_id
 
     def update(self, topic_id: int, topic: Topic) -> None:
         """Say something else of a topic: metadata.yaml tells it, and the files still to come."""
         self._refuse_when_over()
-        before = self._ledger.topics.get(topic_id)
+        before = self._metadata.topics.get(topic_id)
         if before is None or (before.name, before.type) != (topic.name, topic.type):
             raise BagError(f'{self.folder}: topic {topic_id} is not {topic.name}')
         self._set(topic_id, topic)
@@ -135,10 +137,10 @@ class BagWriter:
             pending = self._file.write(definition, data, log_time, publish_time, sequence)
         except (KeyError, struct.error):
             self._refuse_when_over()
-            if topic_id not in self._ledger.topics:
+            if topic_id not in self._metadata.topics:
                 raise BagError(f'{self.folder}: no topic has the id {topic_id}') from None
             raise BagError(
-                f'{self._ledger.topics[topic_id].name}: times must be from 0 to 2^64 - 1 ns, '
+                f'{self._metadata.topics[topic_id].name}: times must be from 0 to 2^64 - 1 ns, '
                 f'not {log_time} and {publish_time}'
             ) from None
         if pending >= self._chunk_size:
@@ -178,8 +180,8 @@ class BagWriter:
 
     def custom(self, key: str, value: str) -> None:
         """Set a text of `custom_data` in metadata.yaml."""
-        if self._ledger.custom.get(str(key)) != str(value):
-            self._ledger.custom[str(key)] = str(value)
+        if self._metadata.custom_data.get(str(key)) != str(value):
+            self._metadata.custom_data[str(key)] = str(value)
             self._stale = True
 
     def attach(
@@ -251,7 +253,7 @@ class BagWriter:
     @property
     def files(self) -> tuple[Path, ...]:
         """The files, the open one last."""
-        return tuple(self.folder / f.path for f in self._ledger.infos(self._file))
+        return tuple(self.folder / f.path for f in self._metadata.files(self._file))
 
     @property
     def message_count(self) -> int:
@@ -261,22 +263,24 @@ class BagWriter:
     @property
     def counts(self) -> dict[str, int]:
         """Messages taken of each topic, by name."""
-        return self._ledger.counts(self._file)
+        return self._metadata.counts(self._file)
 
     @property
     def bytes(self) -> int:
         """Size of the files, without the chunk in the making."""
-        return self._ledger.size + self._file.size
+        return self._metadata.closed_size + self._file.size
 
     @property
     def start(self) -> int:
         """Least log time on the disk [ns]; 0 without messages."""
-        return min((f.start for f in self._ledger.infos(self._file) if f.message_count), default=0)
+        return min(
+            (f.start for f in self._metadata.files(self._file) if f.message_count), default=0
+        )
 
     @property
     def end(self) -> int:
         """Greatest log time on the disk [ns]; 0 without messages."""
-        return max((f.end for f in self._ledger.infos(self._file) if f.message_count), default=0)
+        return max((f.end for f in self._metadata.files(self._file) if f.message_count), default=0)
 
     def __enter__(self) -> Self:
         return self
@@ -294,7 +298,7 @@ class BagWriter:
                 raise
 
     def _set(self, topic_id: int, topic: Topic) -> None:
-        self._writable[topic_id] = self._ledger.set(topic_id, topic)
+        self._writable[topic_id] = self._metadata.set_topic(topic_id, topic)
         self._stale = True
 
     def _refuse_when_over(self) -> None:
@@ -327,17 +331,17 @@ class BagWriter:
         if self._file.size > self._synced:
             self._file.sync()
             self._synced = self._file.size
-            self.flushed = self._ledger.message_count(self._file)
+            self.flushed = self._metadata.message_count(self._file)
             self._stale = True
         if self._file.size >= self._max_size:
             self._turn_at = 0.0
         if self._stale:
-            files.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))
+            self._write_metadata()
             self._stale = False
 
     def _hold_reserve(self) -> None:
-        closing = self._file.closing_size(self._ledger.definitions_size)
-        needed = _MARGIN + closing + 3 * self._ledger.text_size
+        closing = self._file.closing_size(self._metadata.definitions_size)
+        needed = _MARGIN + closing + 3 * self._metadata.text_size
         if needed > self._reserve.size:
             try:
                 self._reserve.hold(2 * needed)
@@ -360,27 +364,31 @@ class BagWriter:
         return files.reason(error) if self.folder.is_dir() else 'the folder has been removed'
 
     def _open_file(self) -> None:
-        number = len(self._ledger.files) + (self._file is not None)
+        number = len(self._metadata.closed_files) + (self._file is not None)
         name = f'{self.folder.name}_{number}.mcap'
         file = McapFile(self.folder / name, self._compression)
         if self._file is not None:
-            self._ledger.fold(self._file)
+            self._metadata.close_file(self._file)
             self._file.close()
         self._file = file
         self._turn_at = 0.0
         self._synced = 0
-        file.add_metadata(metadata.RECORD, {metadata.KEY: self._ledger.text(self._file)})
+        file.add_metadata(metadata.RECORD, {metadata.KEY: self._metadata.text(self._file)})
         files.sync_folder(self.folder)
         self._stale = True
 
     def _finish_file(self) -> None:
         if self._file.finished:
             return
-        self._file.add_metadata(metadata.RECORD, {metadata.KEY: self._ledger.text(self._file)})
-        self._file.finish(list(self._ledger.definitions.values()))
+        self._file.add_metadata(metadata.RECORD, {metadata.KEY: self._metadata.text(self._file)})
+        self._file.finish(list(self._metadata.definitions.values()))
         self._file.sync()
 
     def _end_in_reserve(self) -> None:
         self._reserve.release()
         self._finish_file()
-        files.replace(self.folder / metadata.FILE_NAME, self._ledger.text(self._file))
+        self._write_metadata()
+
+    def _write_metadata(self) -> None:
+        text = self._metadata.text(self._file)
+        files.write_whole(self.folder / metadata.FILE_NAME, text.encode())

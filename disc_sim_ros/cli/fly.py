@@ -9,7 +9,7 @@ import signal
 import sys
 import time
 
-from disc_sim_ros import __version__
+from disc_sim_ros import __version__, files
 from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser, number
 from disc_sim_ros.errors import ConfigError, DiscSimError
@@ -168,7 +168,7 @@ def _bag_writer(
     except ImportError as error:
         allowed = f'it needs rclpy and the message packages of ROS 2 Jazzy ({error})'
         raise ConfigError('--bag', bag, allowed) from None
-    offline_bag.check_new(bag)
+    files.check_new_folder('bag', Path(bag))
     flight.check_flight(
         release, setup, chosen.duration, ground=not chosen.no_ground, sample_rate=0.0
     )

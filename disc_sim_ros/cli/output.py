@@ -5,12 +5,11 @@ from contextlib import contextmanager
 import io
 import os
 from pathlib import Path
-import secrets
-import shutil
 import signal
 import sys
 import threading
 
+from disc_sim_ros import files
 from disc_sim_ros.errors import ConfigError, DiscSimError
 
 
@@ -47,20 +46,8 @@ def write_whole(flag: str, name: str, content: bytes) -> None:
     try:
         if _is_special(Path(name)):  # nothing to keep whole
             Path(name).write_bytes(content)
-            return
-        path = Path(name).resolve()
-        part = path.with_name(f'.{secrets.token_hex(8)}.part')
-        with part.open('xb') as file:
-            try:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-                if path.exists():
-                    shutil.copymode(path, part)
-                part.replace(path)
-            except BaseException:
-                part.unlink()
-                raise
+        else:
+            files.write_whole(Path(name).resolve(), content, keep_mode=True)
     except OSError as error:
         raise ConfigError(flag, name, f'cannot write it ({error.strerror})') from None
 

@@ -4,10 +4,10 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-import secrets
 import time
 from types import ModuleType
 
+from disc_sim_ros.files import write_whole
 from disc_sim_ros.paper import crosscheck, style
 from disc_sim_ros.paper.style import DARK, LIGHT, Look
 
@@ -77,16 +77,6 @@ def write(
         crosscheck.largest_distance(example.flight),
         time.perf_counter() - started,
     )
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file; an older one of that name stays whole until the new one is complete."""
-    part = path.with_name(f'.{secrets.token_hex(8)}.part')
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def main(module: ModuleType, arguments: list[str] | None = None) -> int:

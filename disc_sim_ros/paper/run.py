@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
+from disc_sim_ros import files
 from disc_sim_ros.paper import figure_files, report
 from disc_sim_ros.paper.figure_files import Written
 from disc_sim_ros.paper.figures import FIGURES
@@ -36,7 +37,7 @@ def part(key: str, folder: Path, formats: Sequence[str], *, dark: bool) -> Done:
     if key == STATEMENTS:
         started = time.perf_counter()
         results = table.evaluate()
-        figure_files.write_whole(folder / 'statements.csv', table.csv(results).encode())
+        files.write_whole(folder / 'statements.csv', table.csv(results).encode())
         seconds = time.perf_counter() - started
         return Done(key, 'Table of every statement with a number', seconds, results=results)
     looks = (LIGHT, DARK) if dark else (LIGHT,)
@@ -50,6 +51,6 @@ def write_report(done: Sequence[Done], folder: Path, *, dark: bool) -> report.Re
     figures = tuple(one.figure for one in ordered if one.figure is not None)
     results = next((one.results for one in ordered if one.results is not None), None)
     found = report.Report(figures, results, dark)
-    figure_files.write_whole(folder / 'report.md', report.markdown(found).encode())
-    figure_files.write_whole(folder / 'report.html', report.html(found).encode())
+    files.write_whole(folder / 'report.md', report.markdown(found).encode())
+    files.write_whole(folder / 'report.html', report.html(found).encode())
     return found

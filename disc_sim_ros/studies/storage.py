@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.files import reason, sync_folder, write_whole
 from disc_sim_ros.studies import tables
 from disc_sim_ros.studies.study import Study, study_differences, study_document
 
@@ -96,7 +97,7 @@ class Parts:
             DiscSimError: The system refuses, for instance for lack of space.
         """
         try:
-            _write(self.path(number), tables.parquet_bytes(columns))
+            write_whole(self.path(number), tables.parquet_bytes(columns))
         except OSError as error:
             raise DiscSimError(f'cannot write {self.path(number)} ({reason(error)})') from None
         self.done.add(number)
@@ -112,7 +113,7 @@ class Parts:
         try:
             tables.join(paths, joined, self.output.suffix.lower(), self.question)
             joined.replace(self.output)
-            _sync_folder(self.output.parent)
+            sync_folder(self.output.parent)
         except OSError as error:
             with suppress(OSError):
                 joined.unlink()
@@ -134,7 +135,7 @@ class Parts:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             content = study_document(self.question) | {'batch': self.batch}
-            _write(self.folder / _MANIFEST, json.dumps(content, indent=1).encode())
+            write_whole(self.folder / _MANIFEST, json.dumps(content, indent=1).encode())
         except OSError as error:
             raise DiscSimError(f'cannot write in {self.folder} ({reason(error)})') from None
 
@@ -175,37 +176,9 @@ class Parts:
                 if tables.rows_of(path) == stop - start:
                     sound.add(number)
                     continue
-            if match or path.suffix == '.new':
+            if match or path.suffix == '.part':
                 path.unlink()
         return sound
 
 
 DEFAULT_BATCH = 8192  # flights: half a second on one core, 1 MB
-
-
-def reason(error: OSError) -> str:
-    """Return what the system said, in few words."""
-    return os.strerror(error.errno) if error.errno else str(error).splitlines()[0]
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Write a file that appears whole or not at all, and stays through a power cut."""
-    fresh = path.with_suffix('.new')
-    try:
-        with fresh.open('wb') as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
-    except OSError:
-        with suppress(OSError):
-            fresh.unlink()
-        raise
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

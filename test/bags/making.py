@@ -6,8 +6,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.qos import Qos
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Qos, Topic
 from disc_sim_ros.bags.writer import BagWriter
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)

@@ -22,10 +22,9 @@ from bags.making import (
     topic,
     write_bag,
 )
-from disc_sim_ros.bags import qos, schemas
-from disc_sim_ros.bags.qos import INFINITE, Qos
+from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.reader import open_bag
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import INFINITE, Qos, Topic, parse_qos, qos_yaml
 from disc_sim_ros.bags.writer import BagWriter
 
 pytest.importorskip('rclpy')  # the definitions of messages come with it
@@ -204,7 +203,7 @@ def test_header_metadata_channels_and_schemas_say_what_rosbag2_says(folder):
     channel = next(r for r in found if isinstance(r, records.Channel) and r.topic == '/odom')
     assert channel.message_encoding == 'cdr'
     assert channel.metadata == {
-        'offered_qos_profiles': qos.yaml_list([Qos(depth=1000)]),
+        'offered_qos_profiles': qos_yaml([Qos(depth=1000)]),
         'topic_type_hash': TYPES.hash_rihs01(ODOMETRY),
     }
     schema = next(r for r in found if isinstance(r, records.Schema) and r.name == ODOMETRY)
@@ -321,7 +320,7 @@ def test_what_is_not_installed_has_no_definition(name):
     ],
 )  # fmt: skip
 def test_qos_comes_back(profiles):
-    assert qos.parse(qos.yaml_list(profiles)) == profiles
+    assert parse_qos(qos_yaml(profiles)) == profiles
 
 
 def test_qos_of_bags_before_jazzy_is_understood():
@@ -332,7 +331,7 @@ def test_qos_of_bags_before_jazzy_is_understood():
         '  liveliness_lease_duration:\n    sec: 1\n    nsec: 5\n'
         '  avoid_ros_namespace_conventions: false'
     )
-    assert qos.parse(old) == (
+    assert parse_qos(old) == (
         Qos(
             depth=7,
             reliability='best_effort',

@@ -17,9 +17,9 @@ import yaml
 
 from bags.making import ODOMETRIES, ODOMETRY, START, STEP, TYPES, everything, topic, write_bag
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.qos import Qos
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
+from disc_sim_ros.bags.topic import Qos
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli.repair_bag import main
 from disc_sim_ros.errors import BagError, ConfigError

@@ -19,8 +19,8 @@ from bags.making import (
     topic,
     write_bag,
 )
-from disc_sim_ros.bags.qos import Qos
 from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.bags.topic import Qos
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import BagError, ConfigError
 

@@ -7,8 +7,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.qos import INFINITE, Qos
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import INFINITE, Qos, Topic
 
 DEPTH = 5_000  # messages that wait for the recorder; Fast DDS holds no more for a reader
 

@@ -4,18 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import floor, inf
 from pathlib import Path
-import secrets
-import shutil
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
+from disc_sim_ros import files
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.qos import Qos
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Qos, Topic
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.ros.cdr_template import CdrTemplate
 from disc_sim_ros.ros.sim.clock import NANOSECONDS
@@ -106,19 +104,6 @@ def discovered(qos: QoSProfile) -> Qos:
     )
 
 
-def check_new(bag: str) -> None:
-    """Refuse a folder that exists or cannot be made, before any work is done for it.
-
-    Raises:
-        ConfigError: It exists, or has no name.
-    """
-    folder = Path(bag)
-    if not folder.absolute().name or folder.name == '..':
-        raise ConfigError('bag', bag, 'give the name of a new folder')
-    if folder.exists() or folder.is_symlink():
-        raise ConfigError('bag', bag, 'it exists already, and is never overwritten')
-
-
 def write_flight(
     bag: str, config: SimConfig, control: Control, duration: float, start: int
 ) -> Written:
@@ -139,20 +124,13 @@ def write_flight(
         ConfigError: The folder exists or cannot be made.
         DiscSimError: The system refuses to write, or the flight is lost.
     """
-    check_new(bag)
-    folder = Path(bag).absolute()
-    part = folder.parent / f'.{secrets.token_hex(8)}.part'
+    folder = Path(bag)
     try:
-        with BagWriter(part / folder.name) as writer:
+        with files.whole_folder('bag', folder) as part, BagWriter(part) as writer:
             _fly(BagSinkFactory(writer), config, control, duration, start)
-        written = Written(writer.counts, writer.bytes)
-        check_new(bag)
-        (part / folder.name).rename(folder)
     except OSError as error:
-        raise DiscSimError(f'{folder}: cannot be made ({error.strerror})') from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-    return written
+        raise DiscSimError(f'{folder.absolute()}: cannot be made ({error.strerror})') from None
+    return Written(writer.counts, writer.bytes)
 
 
 def _fly(

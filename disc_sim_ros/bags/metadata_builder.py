@@ -1,4 +1,4 @@
-"""What a bag in the making holds: its topics, its files, and the metadata that tells of them."""
+"""The part of the writer that collects what metadata.yaml reports: topics, files, counts."""
 
 from collections.abc import Mapping
 
@@ -8,23 +8,23 @@ from disc_sim_ros.bags.metadata import BagMetadata, FileInfo, TopicInfo
 from disc_sim_ros.bags.topic import Topic
 
 
-class Ledger:
-    """Topics and files of one bag."""
+class MetadataBuilder:
+    """Topics and files of the bag that a writer makes."""
 
-    def __init__(self, ros_distro: str, custom: Mapping[str, str]) -> None:
+    def __init__(self, ros_distro: str, custom_data: Mapping[str, str]) -> None:
         self.topics: dict[int, Topic] = {}
         self.definitions: dict[int, Definition] = {}
         self.definitions_size = 0  # bytes
-        self.custom = dict(custom)
-        self.files: list[FileInfo] = []  # those with their end
-        self.size = 0  # bytes of these
+        self.custom_data = dict(custom_data)
+        self.closed_files: list[FileInfo] = []
+        self.closed_size = 0  # bytes of these files
         self.text_size = 0  # bytes of the last metadata
-        self._counts: dict[int, int] = {}  # messages in these, by topic
+        self._closed_counts: dict[int, int] = {}  # messages in the closed files, by topic
         self._schemas: dict[tuple[str, str], int] = {}  # type, definition: schema id
         self._ros_distro = ros_distro
 
-    def set(self, topic_id: int, topic: Topic) -> Definition:
-        """Note a topic, or what is new of it; return its records."""
+    def set_topic(self, topic_id: int, topic: Topic) -> Definition:
+        """Add a topic or replace its description; return its MCAP records."""
         schema = self._schemas.setdefault((topic.type, topic.definition), len(self._schemas) + 1)
         self.topics[topic_id] = topic
         definition = Definition.of(topic, topic_id, schema)
@@ -32,53 +32,53 @@ class Ledger:
         self.definitions_size = sum(len(d.packed) for d in self.definitions.values())
         return definition
 
-    def fold(self, file: McapFile) -> None:
-        """Note a file that has its end."""
-        self.files.append(info_of(file))
-        self.size += file.size
+    def close_file(self, file: McapFile) -> None:
+        """Add a file that has its end."""
+        self.closed_files.append(file_info(file))
+        self.closed_size += file.size
         for topic_id, count in file.counts.items():
-            self._counts[topic_id] = self._counts.get(topic_id, 0) + count
+            self._closed_counts[topic_id] = self._closed_counts.get(topic_id, 0) + count
 
-    def infos(self, file: McapFile) -> list[FileInfo]:
-        """Return the files with the open one last."""
-        return [*self.files, info_of(file)]
+    def files(self, open_file: McapFile) -> list[FileInfo]:
+        """Return all files, the open one last."""
+        return [*self.closed_files, file_info(open_file)]
 
-    def counts(self, file: McapFile) -> dict[str, int]:
-        """Return the messages by name of the topic, with those of the open chunk."""
+    def counts(self, open_file: McapFile) -> dict[str, int]:
+        """Return the messages of each topic, by name, with those of the open chunk."""
         counts = dict.fromkeys((t.name for t in self.topics.values()), 0)
         for topic_id, topic in self.topics.items():
-            counts[topic.name] += self._count(topic_id, file) + file.pending_of(topic_id)
+            counts[topic.name] += self._count(topic_id, open_file) + open_file.pending_of(topic_id)
         return counts
 
-    def message_count(self, file: McapFile) -> int:
+    def message_count(self, open_file: McapFile) -> int:
         """Return the messages written, without those of the open chunk."""
-        return sum(self._counts.values()) + file.message_count
+        return sum(self._closed_counts.values()) + open_file.message_count
 
-    def text(self, file: McapFile) -> str:
+    def text(self, open_file: McapFile) -> str:
         """Return metadata.yaml, with what is written of the open file."""
         topics: dict[str, TopicInfo] = {}
         for topic_id, topic in self.topics.items():
             before = topics.get(topic.name)  # of another type or definition
-            count = self._count(topic_id, file) + (before.message_count if before else 0)
+            count = self._count(topic_id, open_file) + (before.message_count if before else 0)
             first = before.topic if before else topic
             topics[topic.name] = TopicInfo(topic=first, message_count=count)
         text = metadata.text_of(
             BagMetadata(
                 topics=tuple(topics.values()),
-                files=tuple(self.infos(file)),
-                custom_data=self.custom,
+                files=tuple(self.files(open_file)),
+                custom_data=self.custom_data,
                 ros_distro=self._ros_distro,
             )
         )
         self.text_size = len(text.encode())
         return text
 
-    def _count(self, topic_id: int, file: McapFile) -> int:
-        return self._counts.get(topic_id, 0) + file.counts.get(topic_id, 0)
+    def _count(self, topic_id: int, open_file: McapFile) -> int:
+        return self._closed_counts.get(topic_id, 0) + open_file.counts.get(topic_id, 0)
 
 
-def info_of(file: McapFile) -> FileInfo:
-    """Return what metadata.yaml says of a file."""
+def file_info(file: McapFile) -> FileInfo:
+    """Return the entry of a file in metadata.yaml."""
     return FileInfo(
         path=file.path.name, message_count=file.message_count, start=file.start, end=file.end
     )
