@@ -17,12 +17,11 @@ from disc_sim_ros.analysis.checks import (
     turns_with_spin,
     with_twist,
 )
-from disc_sim_ros.analysis.odometry import paper_states
 from disc_sim_ros.analysis.recording import NANOSECONDS, Change, Flight
 from disc_sim_ros.analysis.resimulate import Reflight, Verdict, compare, fly_again
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.physics import frames
+from disc_sim_ros.physics import frames, theory
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.trajectory import Trajectory
 
@@ -74,7 +73,7 @@ def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
     except DiscSimError as error:
         why_not = str(error)
     motion = with_twist(flight.motion)
-    states = paper_states(motion.numbers)
+    states = frames.states_from_odometry(motion.numbers)
     if again is not None and verdict is not None and verdict.exact:
         winds, wind = again.winds, GUSTS if again.setup.wind.turbulence else MEAN
     else:
@@ -136,7 +135,7 @@ def _landing(
     }
     if flight.motion.has_twist:
         row = int(np.searchsorted(flight.time, found['flight_time_s']))
-        found['spin_rad_s'] = -float(flight.motion.numbers[max(row - 1, 0), 12])
+        found['spin_rad_s'] = frames.flip(float(flight.motion.numbers[max(row - 1, 0), 12]))
     return found
 
 
@@ -233,20 +232,21 @@ def _launch_document(a: Analysis) -> dict[str, Any]:
     s = a.release
     e = (s.e0, s.e1, s.e2, s.e3)
     roll, pitch, yaw = np.degrees(frames.euler_from_quaternion(e)).tolist()
-    u, v, w = frames.rotation_matrix(e).T @ np.array(s[3:6])
+    u, v, w = (frames.rotation_matrix(e).T @ np.array(s[3:6])).tolist()
+    vx, vy, vz = frames.flip_yz(s[3:6])
     return {
         'speed_m_s': math.hypot(*s[3:6]),
         'roll_deg': roll + 0.0,
         'pitch_deg': pitch,
         'yaw_deg': yaw + 0.0,
-        'angle_of_attack_deg': math.degrees(math.atan2(w, math.hypot(u, v))),
-        'climb_deg': math.degrees(math.atan2(-s.VZ, math.hypot(s.VX, s.VY))),
+        'angle_of_attack_deg': math.degrees(theory.angle_of_attack(u, v, w)),
+        'climb_deg': math.degrees(math.atan2(vz, math.hypot(vx, vy))),
         'heading_deg': math.degrees(math.atan2(s.VY, s.VX)),
         'spin_rad_s': s.r,
         'roll_rate_rad_s': s.p,
         'pitch_rate_rad_s': s.q,
         'position_m': (frames.map_from_paper(s[:3]) + 0.0).tolist(),
-        'height_m': 0.0 - s.Z,
+        'height_m': frames.flip(s.Z),
         'frame_spins': turns_with_spin(a.flight.motion),
     }
 
@@ -255,8 +255,9 @@ def _heading(a: Analysis) -> float:
     """Return where the launch aimed, left of +x [rad]: the disc, or else the velocity."""
     s = a.release
     if a.again is not None:
-        return -float(frames.euler_from_quaternion((s.e0, s.e1, s.e2, s.e3))[2])
-    return math.atan2(-s.VY, s.VX)
+        return frames.flip(float(frames.euler_from_quaternion((s.e0, s.e1, s.e2, s.e3))[2]))
+    vx, vy, _ = frames.flip_yz(s[3:6])
+    return math.atan2(vy, vx)
 
 
 def changes_of(flight: Flight) -> list[Change]:

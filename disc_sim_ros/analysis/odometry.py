@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import struct
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.bags.reader import RawMessage
 from disc_sim_ros.errors import BagError
-from disc_sim_ros.physics import frames
-from disc_sim_ros.physics.kernels import rotation
 
 IntArray = NDArray[np.int64]
 
@@ -160,36 +158,3 @@ def _motion(
         log=np.array([min(m.log_time, _LATEST) for m in group], dtype=np.int64),
         numbers=np.hstack(parts).astype(float),
     )
-
-
-def message_numbers(states: ArrayLike) -> FloatArray:
-    """Return states of the core as the numbers of Odometry, to the bit those of sim_node.
-
-    Args:
-        states: In the order of `equations.State`, the paper's axes, shape (n, 14).
-
-    Returns:
-        In the order of COMPONENTS, shape (n, 13).
-    """
-    s = np.atleast_2d(np.asarray(states, dtype=float)).T
-    X, Y, Z, VX, VY, VZ, e0, e1, e2, e3, p, q, r, _ = s  # noqa: N806
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation.rotation_elements(e0, e1, e2, e3)
-    u = xx * VX + yx * VY + zx * VZ
-    v = 0.0 - (xy * VX + yy * VY + zy * VZ)
-    w = 0.0 - (xz * VX + yz * VY + zz * VZ)
-    columns = (X, 0.0 - Y, 0.0 - Z, e1, 0.0 - e2, 0.0 - e3, e0, u, v, w, p, 0.0 - q, 0.0 - r)
-    return np.stack(columns, axis=1)
-
-
-def paper_states(numbers: FloatArray) -> FloatArray:
-    """Return the numbers of Odometry as states of the core, spin angle 0, shape (n, 14).
-
-    Attitudes become unit quaternions; the velocity is turned out of the disc to within rounding.
-    """
-    position = frames.paper_from_map(numbers[:, :3])
-    norm = np.linalg.norm(numbers[:, 3:7], axis=1, keepdims=True)
-    e = frames.paper_quaternion(numbers[:, 3:7] / np.where(norm > 0.0, norm, np.nan))
-    uvw = frames.paper_from_map(numbers[:, 7:10])
-    velocity = np.einsum('nij,nj->ni', frames.rotation_matrix(e), uvw)
-    rates = frames.paper_from_map(numbers[:, 10:13])
-    return np.hstack([position, velocity, e, rates, np.zeros((len(numbers), 1))]) + 0.0

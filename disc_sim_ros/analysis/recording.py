@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, Motion, message_numbers, motions
+from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, Motion, motions
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.bags.reader import Bag, Message
 from disc_sim_ros.errors import BagError
+from disc_sim_ros.physics.frames import odometry_array
 from disc_sim_ros.physics.kernels.equations import State
 
 NANOSECONDS = 1_000_000_000
@@ -355,7 +356,7 @@ _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 def _is_of(document: Mapping[str, Any], numbers: FloatArray) -> bool:
     state = [float(document['release'][name]) for name in State._fields]
-    off = np.abs(message_numbers(state)[0][_RELEASED] - numbers[_RELEASED])
+    off = np.abs(odometry_array(state)[0][_RELEASED] - numbers[_RELEASED])
     return bool((off <= _ROUNDING * (1.0 + np.abs(numbers[_RELEASED]))).all())
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from disc_sim_ros import __version__, validation
-from disc_sim_ros.analysis.odometry import COMPONENTS, message_numbers
+from disc_sim_ros.analysis.odometry import COMPONENTS
 from disc_sim_ros.analysis.recording import APPLIED, NANOSECONDS, Change, Flight
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError, DiscSimError, IntegrationError
@@ -173,7 +173,7 @@ def compare(flight: Flight, again: Reflight, bag_doubts: tuple[str, ...] = ()) -
         again: Its re-flight.
         bag_doubts: What the bag as a whole may lack.
     """
-    recorded, flown = flight.motion.numbers, message_numbers(again.states)
+    recorded, flown = flight.motion.numbers, frames.odometry_array(again.states)
     if recorded.shape[1] == 7:
         flown = flown[:, :7]
     apart = np.abs(recorded - flown)

@@ -16,6 +16,7 @@ from disc_sim_ros.cli import output, study_flags
 from disc_sim_ros.cli.arguments import Parser, number
 from disc_sim_ros.cli.study_flags import listed
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics import frames
 
 if TYPE_CHECKING:
     from disc_sim_ros.studies.optimise import Problem
@@ -130,7 +131,7 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
     if hasattr(chosen, 'target'):
         target = (chosen.target[0], chosen.target[1])
         if 'yaw' not in given:
-            bearing = -math.degrees(math.atan2(target[1], target[0]))
+            bearing = frames.flip(math.degrees(math.atan2(target[1], target[0])))
             limits['yaw'] = (bearing - 45.0, bearing + 45.0)
     for name, span in study_flags.ranges('--limit', listed(chosen, 'limit')).items():
         if name in given:

@@ -16,6 +16,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.physics import frames, theory
 from disc_sim_ros.physics.launch import Launch
 
 KEY = '4'
@@ -170,12 +171,12 @@ def _launch(angles: tuple[float, ...], uvw: tuple[float, ...], pqr: tuple[float,
         roll=angles[0],
         pitch=angles[1],
         yaw=angles[2],
-        angle_of_attack=math.degrees(math.atan2(w, math.hypot(u, v))),
+        angle_of_attack=math.degrees(theory.angle_of_attack(u, v, w)),
         sideslip=math.degrees(math.atan2(v, u)),
         spin=pqr[2],
         roll_rate=pqr[0],
         pitch_rate=pqr[1],
-        height=-RELEASE[2],
+        height=frames.flip(RELEASE[2]),
     )
 
 

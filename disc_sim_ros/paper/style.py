@@ -17,6 +17,7 @@ import numpy as np
 from PIL import Image
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.trajectory import Trajectory
 
 DPI = 130
@@ -125,7 +126,7 @@ def family(values: Sequence[float], look: Look) -> list[Any]:
 
 def view(points: FloatArray, side: str) -> FloatArray:
     """Return X and height, or X and Y, of points in axes 1 of shape (..., 3), shape (..., 2)."""
-    across = -points[..., 2] if side == SIDE else points[..., 1]
+    across = frames.flip(points[..., 2]) if side == SIDE else points[..., 1]
     return np.stack([points[..., 0], across], axis=-1)
 
 

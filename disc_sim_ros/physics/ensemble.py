@@ -84,12 +84,12 @@ class Landings:
     @property
     def y(self) -> FloatArray:
         """Return how far left each ended [m]."""
-        return 0.0 - self.states[:, 1]
+        return frames.flip(self.states[:, 1])
 
     @property
     def z(self) -> FloatArray:
         """Return how high each ended [m]; 0 where it landed."""
-        return np.where(self.status == LANDED, 0.0, 0.0 - self.states[:, 2])
+        return np.where(self.status == LANDED, 0.0, frames.flip(self.states[:, 2]))
 
     @property
     def range(self) -> FloatArray:

@@ -242,7 +242,7 @@ def fly(
         landed=ended.status == integrator.LANDED,
         time=ended.t,
         end=ended.state,
-        apex=-ended.apex_Z,
+        apex=frames.flip(ended.apex_Z),
         trajectory=Trajectory(samples[: ended.samples], setup.disc.diameter),
     )
 

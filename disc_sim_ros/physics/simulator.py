@@ -7,7 +7,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics import disc_file, frames
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup, checked_control, lost
 from disc_sim_ros.physics.kernels import integrator
@@ -45,7 +45,9 @@ class FlightSimulator:
         """
         setup.check_step(release.r, math.hypot(release.VX, release.VY, release.VZ))
         if ground and release.Z > 0.0:
-            raise ConfigError('height', -release.Z, 'with ground, release at 0 m or above')
+            raise ConfigError(
+                'height', frames.flip(release.Z), 'with ground, release at 0 m or above'
+            )
         self.setup = setup
         self.ground = ground
         self.release = release

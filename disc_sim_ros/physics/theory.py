@@ -1,13 +1,39 @@
-"""What the paper derives of a flight: eqns 50 and 53 to 64 as docs/deviations.md corrects them.
+"""What the paper derives: eqns 17, 50 and 53 to 64, as docs/deviations.md corrects them.
 
 Pure functions of floats or of arrays that broadcast.
 """
+
+import math
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.disc import Disc
+
+
+@overload
+def angle_of_attack(u: float, v: float, w: float) -> float: ...
+@overload
+def angle_of_attack(u: FloatArray, v: FloatArray, w: FloatArray) -> FloatArray: ...
+def angle_of_attack(
+    u: float | FloatArray, v: float | FloatArray, w: float | FloatArray
+) -> float | FloatArray:
+    """Return alpha = atan2(w, u3) with u3 = hypot(u, v) [rad], -pi/2 to pi/2 (eqn 17).
+
+    The compiled equations have the same definition, in `equations.flow`.
+
+    Args:
+        u: Velocity relative to the air along x of axes 2, fixed to the disc or despun [m/s]. A
+            float, or an array of any shape.
+        v: Along y of the same axes [m/s], of the type and shape of `u`.
+        w: Along z of the same axes, through the underside [m/s], of the type and shape of `u`.
+    """
+    if isinstance(u, float):
+        return math.atan2(w, math.hypot(u, v))
+    alpha: FloatArray = np.arctan2(w, np.hypot(u, v))
+    return alpha
 
 
 def absolute_attitude(phi: ArrayLike, theta: ArrayLike) -> FloatArray:

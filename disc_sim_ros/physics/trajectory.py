@@ -1,14 +1,60 @@
-"""A sampled flight and what the paper plots of it."""
+"""What the paper plots: of one state, and of a sampled flight."""
 
 from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import frames, theory
-from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.physics.kernels.equations import State, Velocity
+from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
 COLUMNS = 1 + len(State._fields) + 3  # t, the state, the wind
+_NO_AIRSPEED = 1e-9  # m/s
+
+
+class Quantities(NamedTuple):
+    """What the paper plots of one state; all finite."""
+
+    airspeed: float  # m/s
+    angle_of_attack: float  # rad, air on the underside positive
+    absolute_attitude: float  # rad, between the disc's axis and the vertical
+    advance_ratio: float  # rim speed to airspeed, with the sign of the spin
+    spin_rate: float  # rad/s, the paper's r: clockwise from above positive
+
+
+def quantities(s: State, wind: Velocity, diameter: float) -> Quantities:
+    """Return what the paper plots (eqns 17, 50 and 63) of one state.
+
+    `Trajectory` has the same quantities as arrays; this is scalar Python, because the node calls
+    it at up to 10 kHz.
+
+    Args:
+        s: State.
+        wind: Wind at the disc, where the air moves to, earth axes 1 [m/s].
+        diameter: The paper's c [m].
+
+    Returns:
+        The quantities. A disc without airspeed has angle of attack and advance ratio 0, because
+        messages carry finite numbers.
+    """
+    _, _, _, VX, VY, VZ, e0, e1, e2, e3, _, _, r, _ = s
+    V_X, V_Y, V_Z = VX - wind.X, VY - wind.Y, VZ - wind.Z
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation_elements(e0, e1, e2, e3)
+    u = xx * V_X + yx * V_Y + zx * V_Z
+    v = xy * V_X + yy * V_Y + zy * V_Z
+    w = xz * V_X + yz * V_Y + zz * V_Z
+    V = math.hypot(math.hypot(u, v), w)
+    flies = V > _NO_AIRSPEED
+    return Quantities(
+        V,
+        theory.angle_of_attack(u, v, w) if flies else 0.0,
+        math.atan2(math.hypot(xz, yz), zz),
+        0.5 * r * diameter / V if flies else 0.0,
+        r,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +129,7 @@ class Trajectory:
     def alpha(self) -> FloatArray:
         """Angle of attack [rad], -pi/2 to pi/2, shape (n,) (eqn 17)."""
         u, v, w = self.air_velocity.T
-        alpha: FloatArray = np.arctan2(w, np.hypot(u, v))
+        alpha: FloatArray = theory.angle_of_attack(u, v, w)
         return alpha
 
     @property

@@ -1,21 +1,25 @@
-"""Numbers of the core to numbers of messages and back: pure functions, and no clock.
+"""The fields of messages in the order of the physics' numbers, and numbers from messages.
 
-The core has the paper's axes, z down, messages have REP-103's, z up; docs/axes.md explains both.
-To messages, each function returns plain floats in the order of the field names beside it, which
-`cdr_template.CdrTemplate` takes. They are scalar Python because they run at up to 10 kHz, where
-arrays of three numbers cost more than they save. From messages, everything is checked.
+To messages: each tuple of field paths has the order of the numbers of the function beside it;
+`cdr_template.CdrTemplate` takes both. The functions, with the turn from the paper's axes to
+REP-103, are in `physics.frames`, `physics.imu` and `physics.trajectory`.
+
+From messages: every number is checked, and turned to the paper's axes by `physics.frames`.
+docs/axes.md explains both kinds of axes.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from disc_sim_ros import topics, validation
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames as paper_frames
+from disc_sim_ros.physics import imu as ideal_imu
+from disc_sim_ros.physics import trajectory
 from disc_sim_ros.physics.frames import flip_yz
-from disc_sim_ros.physics.kernels import rotation
-from disc_sim_ros.physics.kernels.equations import DISC, DISC_AIR, DISC_BODY, State, Velocity
+from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.physics.kernels.rotation import Quaternion
 from disc_sim_ros.topics import Frames
 
 _VECTOR = ('x', 'y', 'z')
@@ -46,154 +50,23 @@ LARGEST_POSITION = 1e4  # m, each component
 LARGEST_SPEED = 200.0  # m/s
 LARGEST_RATE = 1e3  # rad/s, each component
 _UNIT_NORM = 1e-3  # a quaternion this near to unit length is meant to have it
-_NO_AIRSPEED = 1e-9  # m/s
 _NANOSECONDS = 1_000_000_000
 
-Pose = tuple[float, float, float, float, float, float, float]
-Odometry = tuple[
-    float, float, float, float, float, float, float, float, float, float, float, float, float
-]
-Six = tuple[float, float, float, float, float, float]
-
-
-class Quantities(NamedTuple):
-    """What the paper plots, each a topic of one number; all finite."""
-
-    airspeed: float  # m/s
-    angle_of_attack: float  # rad, air on the underside positive
-    absolute_attitude: float  # rad, between the disc's axis and the vertical
-    advance_ratio: float  # rim speed to airspeed, with the sign of the spin
-    spin_rate: float  # rad/s, the paper's r: clockwise from above positive
+# The numbers in the order of the fields.
+pose = paper_frames.pose  # POSE_FIELDS and TRANSFORM_FIELDS
+odometry = paper_frames.odometry  # ODOMETRY_FIELDS
+spin_transform = paper_frames.spin_transform  # SPIN_TRANSFORM_FIELDS
+spin_joint = paper_frames.spin_joint  # JOINT_FIELDS
+imu = ideal_imu.reading  # IMU_FIELDS
+quantities = trajectory.quantities  # each a std_msgs/Float64 with the name of its field as topic
+Quantities = trajectory.Quantities
+moment_axes = paper_frames.moment_axes
+Six = ideal_imu.Reading
 
 
 def stamp(nanoseconds: int) -> tuple[int, int]:
     """Return a time in nanoseconds as the seconds and nanoseconds of a message."""
     return divmod(nanoseconds, _NANOSECONDS)
-
-
-def pose(s: State) -> Pose:
-    """Return position [m] and quaternion x, y, z, w of `disc` in `map`.
-
-    In the order of POSE_FIELDS and of TRANSFORM_FIELDS.
-    """
-    return s.X, 0.0 - s.Y, 0.0 - s.Z, s.e1, 0.0 - s.e2, 0.0 - s.e3, s.e0
-
-
-def odometry(s: State) -> Odometry:
-    """Return the `pose`, and velocity over the ground and angular velocity in `disc`.
-
-    In the order of ODOMETRY_FIELDS [m, 1, m/s, rad/s]. The first seven are `pose(s)`. Angular z
-    carries the spin, clockwise from above negative.
-    """
-    X, Y, Z, VX, VY, VZ, e0, e1, e2, e3, p, q, r, _ = s
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation.rotation_elements(e0, e1, e2, e3)
-    return (
-        X,
-        0.0 - Y,
-        0.0 - Z,
-        e1,
-        0.0 - e2,
-        0.0 - e3,
-        e0,
-        xx * VX + yx * VY + zx * VZ,
-        0.0 - (xy * VX + yy * VY + zy * VZ),
-        0.0 - (xz * VX + yz * VY + zz * VZ),
-        p,
-        0.0 - q,
-        0.0 - r,
-    )
-
-
-def spin_joint(s: State) -> tuple[float, float]:
-    """Return the angle [rad] and the rate [rad/s] of `disc_body` in `disc`, about z up.
-
-    In the order of JOINT_FIELDS. The angle lies between -pi and pi.
-    """
-    return math.remainder(0.0 - s.sigma, math.tau), 0.0 - s.r
-
-
-def spin_transform(s: State) -> tuple[float, float]:
-    """Return z and w of the quaternion of `disc_body` in `disc`; x and y are 0.
-
-    In the order of SPIN_TRANSFORM_FIELDS.
-    """
-    half = 0.5 * math.remainder(0.0 - s.sigma, math.tau)
-    return math.sin(half), math.cos(half)
-
-
-def imu(
-    s: State, acceleration: Vector, rates_change: Vector, offset: Vector, gravity: float
-) -> Six:
-    """Return what an ideal IMU measures that is fixed in the plastic and aligned with it.
-
-    Args:
-        s: State.
-        acceleration: dV/dt of the centre over the ground, earth axes 1 [m/s^2]; zeros at rest.
-        rates_change: dp/dt, dq/dt, dr/dt in despun axes 2 [rad/s^2].
-        offset: Where the IMU is, from the centre of the disc, in `disc_body` [m].
-        gravity: g [m/s^2].
-
-    Returns:
-        Angular velocity [rad/s] and specific force [m/s^2] (acceleration minus gravity: +g along
-        z when lying level) in `disc_body`, in the order of IMU_FIELDS.
-    """
-    p, q, r = s.p, s.q, s.r
-    p_dot, q_dot, r_dot = rates_change
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation.rotation_elements(s.e0, s.e1, s.e2, s.e3)
-    f_X, f_Y, f_Z = acceleration
-    f_Z -= gravity
-
-    # Components in despun axes change also because these turn at (p, q, 0): (p, q, 0) x (p, q, r)
-    # is (q r, -p r, 0). From here on in `disc`: z is up.
-    w_x, w_y, w_z = p, 0.0 - q, 0.0 - r
-    a_x, a_y, a_z = p_dot + q * r, p * r - q_dot, 0.0 - r_dot
-    c, si = math.cos(s.sigma), 0.0 - math.sin(s.sigma)  # of the angle of `disc_body` about z up
-    o_x, o_y, o_z = c * offset[0] - si * offset[1], si * offset[0] + c * offset[1], offset[2]
-
-    # f + a x o + w x (w x o)
-    v_x, v_y, v_z = w_y * o_z - w_z * o_y, w_z * o_x - w_x * o_z, w_x * o_y - w_y * o_x
-    f_x = xx * f_X + yx * f_Y + zx * f_Z + a_y * o_z - a_z * o_y + w_y * v_z - w_z * v_y
-    f_y = a_z * o_x - a_x * o_z + w_z * v_x - w_x * v_z - (xy * f_X + yy * f_Y + zy * f_Z)
-    f_z = a_x * o_y - a_y * o_x + w_x * v_y - w_y * v_x - (xz * f_X + yz * f_Y + zz * f_Z)
-    return (
-        c * w_x + si * w_y,
-        c * w_y - si * w_x,
-        w_z,
-        c * f_x + si * f_y,
-        c * f_y - si * f_x,
-        f_z,
-    )
-
-
-def quantities(s: State, wind: Velocity, diameter: float) -> Quantities:
-    """Return what the paper plots (eqns 17, 50 and 63).
-
-    Args:
-        s: State.
-        wind: Wind at the disc, where the air moves to, earth axes 1 [m/s].
-        diameter: The paper's c [m].
-
-    Returns:
-        The quantities. A disc without airspeed has angle of attack and advance ratio 0, because
-        messages carry finite numbers.
-    """
-    V_X, V_Y, V_Z = s.VX - wind.X, s.VY - wind.Y, s.VZ - wind.Z
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation.rotation_elements(s.e0, s.e1, s.e2, s.e3)
-    u3 = math.hypot(xx * V_X + yx * V_Y + zx * V_Z, xy * V_X + yy * V_Y + zy * V_Z)
-    w = xz * V_X + yz * V_Y + zz * V_Z
-    V = math.hypot(u3, w)
-    return Quantities(
-        airspeed=V,
-        angle_of_attack=math.atan2(w, u3) if V > _NO_AIRSPEED else 0.0,
-        absolute_attitude=math.atan2(math.hypot(xz, yz), zz),
-        advance_ratio=0.5 * s.r * diameter / V if V > _NO_AIRSPEED else 0.0,
-        spin_rate=s.r,
-    )
-
-
-def moment_axes(frames: Frames) -> dict[str, int]:
-    """Return the axes of `equations.Control` by the frame that a moment in N m is given in."""
-    return {frames.disc: DISC, frames.disc_body: DISC_BODY, frames.disc_air: DISC_AIR}
 
 
 def moment_from_wrench(message: Any, frames: Frames) -> tuple[float, float, float, int]:
@@ -285,7 +158,7 @@ def release_from_odometry(message: Any, frames: Frames) -> State:
     return State(X, Y, Z, VX, VY, VZ, *e, p, q, r, sigma=0.0)
 
 
-def _attitude(thing: str, orientation: Any) -> rotation.Quaternion:
+def _attitude(thing: str, orientation: Any) -> Quaternion:
     """Return the unit quaternion of despun axes 2 in axes 1, scalar first."""
     xyzw = [
         validation.number(f'{thing}.{name}', getattr(orientation, name), -2.0, 2.0)

@@ -9,7 +9,7 @@ from analysis import foreign
 from analysis.foreign import GRAVITY, SECOND, START, STORE, Parabola
 from disc_sim_ros.analysis import checks
 from disc_sim_ros.analysis.flights import flights, velocities
-from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, motions, paper_states
+from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, motions
 from disc_sim_ros.analysis.recording import Disc
 from disc_sim_ros.bags.reader import RawMessage
 from disc_sim_ros.errors import BagError
@@ -73,7 +73,7 @@ def test_other_bytes_are_refused(change):
 def test_states_of_the_core_have_the_velocity_over_the_ground():
     parabola = Parabola()
     (motion,) = motions(raw(parabola.odometry()), ODOMETRY)
-    states = paper_states(motion.numbers)
+    states = paper_frames.states_from_odometry(motion.numbers)
     # Turned into the body and back: rounding of numbers of 12 m/s.
     assert_allclose(states[:, 3:6], paper_frames.paper_from_map(parabola.velocity), atol=1e-13)
     assert_allclose(states[:, 12], parabola.spin, rtol=1e-15)

@@ -18,10 +18,11 @@ from std_msgs.msg import Float64, String
 from visualization_msgs.msg import MarkerArray
 
 from disc_sim_ros import topics
-from disc_sim_ros.analysis.odometry import ODOMETRY, message_numbers, motions
+from disc_sim_ros.analysis.odometry import ODOMETRY, motions
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.frames import odometry_array
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.ros.sim import offline_bag
@@ -170,7 +171,7 @@ def test_it_is_the_flight_of_fly_to_the_bit(tmp_path, rate, changes):
     states = flown.trajectory.rows[:, 1:15]
     assert flown.landed
     assert len(motion) == len(states) + 1  # and the disc on the ground
-    assert_array_equal(motion.numbers[:-1], message_numbers(states))
+    assert_array_equal(motion.numbers[:-1], odometry_array(states))
     every = SECOND / rate
     assert_array_equal(motion.stamps, [START + int(k * every) for k in range(len(motion))])
     assert motion.numbers[-1, 2] == 0.0
@@ -181,11 +182,11 @@ def test_it_is_the_flight_of_fly_to_the_bit(tmp_path, rate, changes):
 def test_it_ends_with_the_duration(tmp_path):
     motion, flown = written(tmp_path / 'bag', duration=0.3, ground=False)
     assert len(motion) == len(flown.trajectory) == 61
-    assert_array_equal(motion.numbers, message_numbers(flown.trajectory.rows[:, 1:15]))
+    assert_array_equal(motion.numbers, odometry_array(flown.trajectory.rows[:, 1:15]))
 
 
 def test_numbers_of_messages_are_those_of_the_node():
-    """`analysis` may not import `nodes`: both turn states into messages, with the same bits."""
+    """A re-simulation turns arrays of states, the node one state: with the same bits."""
     from disc_sim_ros.physics.kernels.equations import State
     from disc_sim_ros.ros.messages import odometry
 
@@ -194,7 +195,7 @@ def test_numbers_of_messages_are_those_of_the_node():
     states[:, 6:10] /= np.linalg.norm(states[:, 6:10], axis=1, keepdims=True)
     states[0] = 0.0
     expected = np.array([odometry(State(*row)) for row in states.tolist()])
-    assert message_numbers(states).tobytes() == expected.tobytes()
+    assert odometry_array(states).tobytes() == expected.tobytes()
 
 
 def test_a_bag_is_never_overwritten_nor_left_unfinished(tmp_path):
