@@ -1,10 +1,11 @@
 # Targets of one line; the work is in tools/. PYTHON=... chooses the interpreter for .venv.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test test lint fly bench bench-flights bench-steps fuzz clean
+.PHONY: help setup setup-test lock test lint docs fly bench bench-flights bench-steps fuzz clean
 
-# A sourced ROS installation must not mix with the ROS in .venv, and a Python started by the ROS
-# wheels hands down a guard that would keep those of .venv from starting.
+# A sourced ROS installation must not mix with the ROS wheels in .venv. A Python started by the ROS
+# wheels sets a guard variable that its child processes inherit; with it, the wheels of .venv do
+# not start.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH PYTHONHOME PYTHONPATH
 
 BIN := .venv/bin
@@ -18,11 +19,14 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
 		printf '  %-14s %s\n' "$$name" "$$text"; done
 
-setup: ## make .venv with the package and ROS 2 Jazzy (PYTHON=python3.12 chooses the Python)
+setup: ## make .venv with the package and ROS 2 Jazzy (PYTHON=python3.12 selects the Python)
 	@tools/setup-venv run
 
 setup-test:
 	@tools/setup-venv test
+
+lock: ## install what setup.py needs in addition, then write requirements-dev.lock
+	@tools/setup-venv lock
 
 test: setup-test ## setup, then every test, ruff, mypy and the import rules
 	@tools/check tests ruff format mypy imports
@@ -34,7 +38,7 @@ fly: setup ## throw a disc in real time, record and plot it (DISC=wraith THROW='
 	@if $(BIN)/python -c 'import rclpy' 2>/dev/null; then \
 		$(BIN)/demo $(if $(DISC),--disc '$(DISC)') $(THROW); \
 	else \
-		echo 'fly: no ROS 2 in .venv: the throw is computed, without simulator, recorder and bag'; \
+		echo 'fly: .venv has no ROS 2: computing the throw without simulator, recorder and bag'; \
 		mkdir -p flights && \
 		$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW); \
 	fi
@@ -45,7 +49,7 @@ bench-flights: setup-test ## measure flights per second
 bench-steps: setup-test ## draw the error over the step, in despun axes and in spinning ones
 	@$(BIN)/python benchmarks/steps.py --write
 
-bench: setup-test ## measure everything beside its peers, 6 minutes; writes the tables of docs/ and README
+bench: setup-test ## measure everything beside its peers, 6 minutes; writes docs/benchmarks.md and README
 	@$(BIN)/python benchmarks/run.py --write $(if $(PEERS),--peers '$(PEERS)')
 
 fuzz: setup-test ## fuzz every input, 10 minutes each (after .venv/bin/pip install -e .[fuzz])

@@ -101,6 +101,8 @@ setup(
         ],
         # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
+        # `make docs`.
+        'docs': ['furo>=2024.8', 'myst-parser>=4,<6', 'Sphinx>=8,<10'],
         'fuzz': ['atheris>=2.3,<4'],
         'test': [
             'packaging>=23',

@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
 """Write or check the table of dependencies and the lock file of the development environment.
 
-    .venv/bin/python tools/dependencies.py            # say what is out of date, exit code 1
-    .venv/bin/python tools/dependencies.py --write    # docs/dependencies.md, requirements-dev.lock
+    make lock                                              # install, then write both files
+    .venv/bin/python tools/dependencies.py                 # exit code 1 if a file is out of date
+    .venv/bin/python tools/dependencies.py --write         # docs/dependencies.md and the lock file
+    .venv/bin/python tools/dependencies.py --check-lock    # exit code 1 if the lock file is stale
 
-What is needed stands in setup.py, why in this file, licences in the metadata of what is installed.
+setup.py lists the requirements and their bounds, this file gives the reason for each, and the
+metadata of the installed packages name the licences.
 """
 
 import argparse
@@ -14,6 +17,7 @@ from importlib import metadata
 from pathlib import Path
 import re
 import sys
+from typing import Any
 from xml.etree import ElementTree as Xml
 
 from packaging.requirements import Requirement
@@ -22,18 +26,21 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[1]
 PAGE, LOCK = ROOT / 'docs' / 'dependencies.md', ROOT / 'requirements-dev.lock'
 BEGIN, END = '<!-- tables: tools/dependencies.py --write -->', '<!-- end of tables -->'
-EXTRAS = ('jazzy', 'dask', 'test')  # of the development environment
-DISTRIBUTED = ('', 'jazzy', 'dask')  # what runs at a user's; the rest are tools
+EXTRAS = ('jazzy', 'dask', 'test', 'docs')  # of the development environment
+DISTRIBUTED = ('', 'jazzy', 'dask')  # what users run; the other extras are tools
+RENEW = 'run `make lock`, then `make test`'
 WHY = {
     'atheris': 'coverage-guided fuzzing, `benchmarks/fuzz`',
     'colcon-core': 'a test builds the package as a ROS workspace does',
-    'colcon-ros': 'the same',
+    'colcon-ros': 'as colcon-core',
     'dask': 'ensembles on many machines, `sweep --executor dask`',
-    'distributed': 'the same',
+    'distributed': 'as dask',
     'hypothesis': 'property-based tests',
-    'llvmlite': 'lanes of SIMD for numba, which brings it',
-    'packaging': 'a test compares the lock file with the bounds',
-    'import-linter': 'holds the direction of imports',
+    'furo': 'theme of the documentation site; its files are local',
+    'llvmlite': 'SIMD instructions for numba, which depends on it',
+    'myst-parser': 'Markdown pages for Sphinx',
+    'packaging': 'compares the lock file with the bounds',
+    'import-linter': 'enforces the direction of imports',
     'lz4': 'bags with lz4 chunks',
     'matplotlib': 'plots and the figures of the paper',
     'mcap': 'the file format of bags',
@@ -43,15 +50,16 @@ WHY = {
     'numpy': 'arrays, normal random numbers',
     'Pillow': 'writes pictures into bags and for figures',
     'pyarrow': 'Parquet tables of ensembles',
-    'pytest': 'tests; with 9.2, pytest-xdist 3.8 keeps no group together',
-    'pytest-timeout': 'a hanging test ends',
-    'pytest-xdist': 'tests on all cores at once',
+    'pytest': 'tests; with pytest 9.2, pytest-xdist 3.8 no longer keeps groups together',
+    'pytest-timeout': 'ends a test that hangs',
+    'pytest-xdist': 'runs tests on all cores',
     'PyYAML': 'disc files, configurations, metadata of bags',
-    'ros-jazzy-common-interfaces': 'messages, where no ROS is installed',
-    'ros-jazzy-rclpy': 'ROS 2 for Python and its middleware, where no ROS is installed',
+    'ros-jazzy-common-interfaces': 'message types, for machines without a ROS installation',
+    'ros-jazzy-rclpy': 'ROS 2 for Python with its middleware, for the same machines',
     'rosbags': 'an independent reader and writer of bags, in tests',
-    'ruff': 'style',
+    'ruff': 'linter and formatter',
     'scipy': 'fits, optimisation and integration in analyses',
+    'Sphinx': 'builds the documentation site',
     'types-PyYAML': 'types of PyYAML for mypy',
     'zstandard': 'bags with zstd chunks',
 }
@@ -59,11 +67,15 @@ PERMISSIVE = {
     '0BSD', 'Apache-2.0', 'Apache-2.0 WITH LLVM-exception', 'BSD', 'BSD-2-Clause', 'BSD-3-Clause',
     'BSL-1.0', 'CC0-1.0', 'MIT', 'MIT-CMU', 'PSF', 'PSF-2.0', 'Zlib',
 }  # fmt: skip
-# Of tools alone: nothing of them is in this package or linked to it.
+# Allowed for tools only: nothing of them is in this package or linked to it.
 TOOLS_ONLY = {'MPL-2.0', 'any OSI', 'Public Domain and BSD and GPL'}
-# What tells no licence where it is installed, or is not installed: as its repository has it.
-_TOLD = {'atheris': 'Apache-2.0', 'ros-fastcdr': 'Apache-2.0', 'ros-fastrtps': 'Apache-2.0'}
-_SAME = {  # how metadata and package.xml call the same licence
+# Packages whose metadata name no licence, or that are not installed: from their repositories.
+_FROM_REPOSITORY = {
+    'atheris': 'Apache-2.0',
+    'ros-fastcdr': 'Apache-2.0',
+    'ros-fastrtps': 'Apache-2.0',
+}
+_SAME = {  # other names of a licence in metadata and in package.xml
     'Apache License 2.0': 'Apache-2.0',
     'Apache License, Version 2.0': 'Apache-2.0',
     'Apache 2.0': 'Apache-2.0',
@@ -83,89 +95,92 @@ _SAME = {  # how metadata and package.xml call the same licence
 
 
 def needed() -> dict[str, list[Requirement]]:
-    """Return the requirements of setup.py by extra; '' for those of everybody."""
+    """Return the requirements of setup.py by extra; '' is the key of install_requires."""
+    lines = {'': setup_argument('install_requires')} | setup_argument('extras_require')
+    return {extra: [Requirement(line) for line in group] for extra, group in lines.items()}
+
+
+def setup_argument(name: str) -> Any:
+    """Return an argument of the call of setup() in setup.py, without running the file."""
     call = next(
         node
         for node in ast.walk(ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8')))
         if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == 'setup'
     )
-    given = {word.arg: word.value for word in call.keywords}
-    found = {'': ast.literal_eval(given['install_requires'])}
-    found |= ast.literal_eval(given['extras_require'])
-    return {extra: [Requirement(line) for line in lines] for extra, lines in found.items()}
+    return ast.literal_eval(next(word.value for word in call.keywords if word.arg == name))
 
 
-def brought(requirements: Iterable[Requirement]) -> dict[str, str]:
-    """Return name and version of all that requirements bring on this machine, as installed."""
-    found: dict[str, str] = {}
-    asked: set[tuple[str, str]] = set()
+def installed(requirements: Iterable[Requirement]) -> dict[str, str]:
+    """Return the installed versions, by name, of requirements and of all their dependencies."""
+    versions: dict[str, str] = {}
+    visited: set[tuple[str, str]] = set()
     waiting = [(r, extra) for r in requirements for extra in ('', *r.extras)]
     while waiting:
         requirement, extra = waiting.pop()
         name = canonicalize_name(requirement.name)
-        if (name, extra) in asked:
+        if (name, extra) in visited:
             continue
-        asked.add((name, extra))
+        visited.add((name, extra))
         try:
             distribution = metadata.distribution(requirement.name)
         except metadata.PackageNotFoundError:
-            continue  # a tool that is left out, such as atheris
-        found[distribution.metadata['Name']] = distribution.version
+            continue  # an optional tool such as atheris
+        versions[distribution.metadata['Name']] = distribution.version
         for line in distribution.requires or ():
             inner = Requirement(line)
             if inner.marker is None or inner.marker.evaluate({'extra': extra}):
                 waiting += [(inner, e) for e in ('', *inner.extras)]
-    return found
+    return versions
 
 
 def licence(name: str) -> str:
-    """Return the licence of an installed distribution; '?' where nothing tells it."""
+    """Return the licence of an installed distribution; '?' if it is unknown."""
     try:
-        found = metadata.metadata(name)
+        fields = metadata.metadata(name)
     except metadata.PackageNotFoundError:
-        return _TOLD.get(name, '?')
-    classifiers = found.get_all('Classifier') or ()
+        return _FROM_REPOSITORY.get(name, '?')
+    classifiers = fields.get_all('Classifier') or ()
     words = [
         c.rpartition(' :: ')[2]
         for c in classifiers
         if c.startswith('License ::') and not c.endswith(('OSI Approved', 'DFSG approved'))
     ]
-    short = (found.get('License') or '').strip()
+    short = (fields.get('License') or '').strip()
     if '\n' in short or len(short) > 60:
         short = ''
-    said = found.get('License-Expression') or _named(short) or ' and '.join(map(_named, words))
-    return said or _of_ros(name)
+    stated = fields.get('License-Expression') or _short(short) or ' and '.join(map(_short, words))
+    return stated or _of_ros(name)
 
 
-def _named(text: str) -> str:
+def _short(text: str) -> str:
     return _SAME.get(text, text)
 
 
 def _of_ros(name: str) -> str:
-    """Return the licence in the package.xml of a ROS wheel, whose metadata has none."""
+    """Return the licence from the package.xml of a ROS wheel; its metadata have none."""
     package = re.sub('^ros-(jazzy-)?', '', name).replace('-', '_')
     file = Path(sys.prefix) / 'share' / package / 'package.xml'
     if not file.is_file():
-        return _TOLD.get(name, '?')
+        return _FROM_REPOSITORY.get(name, '?')
     licences = Xml.parse(file).getroot().iter('license')  # noqa: S314 - installed
-    found = [_named((e.text or '').strip()) for e in licences]
-    return ' AND '.join(dict.fromkeys(found))
+    names = [_short((e.text or '').strip()) for e in licences]
+    return ' AND '.join(dict.fromkeys(names))
 
 
 def is_allowed(text: str, *, tool: bool) -> bool:
-    """Say whether a licence goes with Apache-2.0: a permissive one, of a tool some more."""
+    """Return True if a licence is compatible with Apache-2.0; tools may have some more."""
     if tool and text in TOOLS_ONLY:
         return True
-    ways = [re.split(' AND | and ', way) for way in text.split(' OR ')]
-    known = PERMISSIVE | TOOLS_ONLY if tool else PERMISSIVE
-    return any(all(part in known for part in way) for way in ways)
+    choices = [re.split(' AND | and ', choice) for choice in text.split(' OR ')]
+    allowed = PERMISSIVE | TOOLS_ONLY if tool else PERMISSIVE
+    return any(all(part in allowed for part in choice) for choice in choices)
 
 
 def tables() -> str:
     """Return the tables of docs/dependencies.md.
 
     Raises:
-        ValueError: A dependency without a reason, or with a licence that is not known to fit.
+        ValueError: A dependency has no reason, or a licence that is not known to be compatible.
     """
     by_name: dict[str, tuple[Requirement, list[str]]] = {}
     for extra, requirements in needed().items():
@@ -178,35 +193,36 @@ def tables() -> str:
     for name in sorted(by_name, key=str.lower):
         requirement, extras = by_name[name]
         if name not in WHY:
-            raise ValueError(f'{name}: say in tools/dependencies.py what it is needed for')
-        said = _checked(name, tool=not set(extras) & set(DISTRIBUTED))
+            raise ValueError(f'{name}: add the reason for it to WHY in tools/dependencies.py')
+        terms = _allowed_licence(name, tool=not set(extras) & set(DISTRIBUTED))
         bounds = ', '.join(sorted(map(str, requirement.specifier), reverse=True)) or 'any'
         purpose = 'all' if '' in extras else ', '.join(f'`[{extra}]`' for extra in extras)
-        lines.append(f'| {name} | {bounds} | {purpose} | {WHY[name]} | {said} |')
+        lines.append(f'| {name} | {bounds} | {purpose} | {WHY[name]} | {terms} |')
     return '\n'.join([*lines, '', *_others(set(by_name))])
 
 
 def _others(direct: set[str]) -> list[str]:
-    """Return the table of what the dependencies bring, by licence."""
+    """Return the table of indirect dependencies, by licence."""
     wanted = needed()
-    run = brought(r for extra in DISTRIBUTED for r in wanted.get(extra, ()))
-    everything = brought(r for extra in ('', *EXTRAS) for r in wanted[extra])
+    run = installed(r for extra in DISTRIBUTED for r in wanted.get(extra, ()))
+    everything = installed(r for extra in ('', *EXTRAS) for r in wanted[extra])
     known = {canonicalize_name(name) for name in direct}
-    lines = ['| brought by these | licence |', '|---|---|']
-    for heading, names in (('at run time', set(run)), ('by tools', set(everything) - set(run))):
+    lines = ['| indirect dependencies | licence |', '|---|---|']
+    for heading, names in (('at run time', set(run)), ('of tools', set(everything) - set(run))):
         by_licence: dict[str, list[str]] = {}
         for name in sorted(names, key=str.lower):
             if canonicalize_name(name) not in known:
-                said = _checked(name, tool=heading == 'by tools')
-                by_licence.setdefault(said, []).append(name)
+                terms = _allowed_licence(name, tool=heading == 'of tools')
+                by_licence.setdefault(terms, []).append(name)
         lines += [
-            f'| {heading}: {_listed(by_licence[said])} | {said} |' for said in sorted(by_licence)
+            f'| {heading}: {_listed(by_licence[terms])} | {terms} |'
+            for terms in sorted(by_licence)
         ]
     return lines
 
 
 def _listed(names: list[str]) -> str:
-    """Return names in one line; the wheels of ROS as one where they are many."""
+    """Return names in one line; more than five ROS wheels become one entry."""
     wheels = [name for name in names if name.startswith('ros-')]
     if len(wheels) > 5:
         rest = [name for name in names if name not in wheels]
@@ -214,27 +230,58 @@ def _listed(names: list[str]) -> str:
     return ', '.join(names)
 
 
-def _checked(name: str, *, tool: bool) -> str:
-    said = licence(name)
-    if not is_allowed(said, tool=tool):
-        raise ValueError(f'{name}: licence {said!r} is not known to go with Apache-2.0')
-    return said
+def _allowed_licence(name: str, *, tool: bool) -> str:
+    terms = licence(name)
+    if not is_allowed(terms, tool=tool):
+        raise ValueError(
+            f'{name}: licence {terms!r} is not known to be compatible with Apache-2.0'
+        )
+    return terms
 
 
 def lock() -> str:
-    """Return the text of the lock file, from what is installed."""
-    wanted = needed()
-    found = brought(r for extra in ('', *EXTRAS) for r in wanted[extra])
+    """Return the text of the lock file, from the installed packages.
+
+    Raises:
+        ValueError: A requirement is not installed, or this is not the oldest supported Python.
+            Only that one installs every backport.
+    """
+    oldest = setup_argument('python_requires').removeprefix('>=')
     version = '.'.join(map(str, sys.version_info[:2]))
+    if version != oldest:
+        raise ValueError(f'the lock file is made with CPython {oldest}, and this is {version}')
+    requirements = [r for extra in ('', *EXTRAS) for r in needed()[extra]]
+    versions = installed(requirements)
+    names = {canonicalize_name(name) for name in versions}
+    for requirement in requirements:
+        if canonicalize_name(requirement.name) not in names:
+            raise ValueError(f'{requirement.name} is not installed; {RENEW}')
     lines = [
-        f'# Exact versions of all that disc_sim_ros[{",".join(EXTRAS)}] brings on',
-        f'# CPython {version}, Linux x86-64. Made by tools/dependencies.py --write of an',
-        '# environment in which all tests pass. To install just these:',
-        '#     python3 -m venv .venv',
-        '#     .venv/bin/pip install -r requirements-dev.lock',
-        '#     .venv/bin/pip install --no-deps -e .',
+        f'# Exact versions of disc_sim_ros[{",".join(EXTRAS)}] and all its dependencies, for',
+        f'# CPython {version} and newer on Linux x86-64. `make setup` and `make test` install',
+        '# these versions; `make lock` writes this file.',
     ]
-    return '\n'.join([*lines, *(f'{n}=={found[n]}' for n in sorted(found, key=str.lower))]) + '\n'
+    pins = (f'{name}=={versions[name]}' for name in sorted(versions, key=str.lower))
+    return '\n'.join([*lines, *pins]) + '\n'
+
+
+def pinned(text: str) -> dict[str, str]:
+    """Return the versions of a lock file by canonical name."""
+    pins = (line.partition('==') for line in text.splitlines() if not line.startswith('#'))
+    return {canonicalize_name(name): version for name, _, version in pins}
+
+
+def stale_pin(text: str) -> str:
+    """Return why a lock file does not fit setup.py, in one line; '' if it does."""
+    pins = pinned(text)
+    for extra, requirements in needed().items():
+        for requirement in requirements if extra in {'', *EXTRAS} else ():
+            version = pins.get(canonicalize_name(requirement.name))
+            if version is None:
+                return f'setup.py needs {requirement}, which is not in the file; {RENEW}'
+            if not requirement.specifier.contains(version, prereleases=True):
+                return f'setup.py needs {requirement}, and the file has {version}; {RENEW}'
+    return ''
 
 
 def page(text: str) -> str:
@@ -249,8 +296,14 @@ def main() -> int:
     p = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    p.add_argument('--write', action='store_true', help='write both files')
-    write = p.parse_args().write
+    task = p.add_mutually_exclusive_group()
+    task.add_argument('--write', action='store_true', help='write both files')
+    task.add_argument('--check-lock', action='store_true', help='check the lock file alone')
+    given = p.parse_args()
+    if given.check_lock:
+        reason = stale_pin(LOCK.read_text(encoding='utf-8'))
+        sys.stderr.write(f'{LOCK.name} is stale: {reason}\n' if reason else '')
+        return int(bool(reason))
     stale = []
     try:
         fresh = {PAGE: page(PAGE.read_text(encoding='utf-8')), LOCK: lock()}
@@ -260,11 +313,11 @@ def main() -> int:
     for file, text in fresh.items():
         if not file.is_file() or file.read_text(encoding='utf-8') != text:
             stale.append(file.relative_to(ROOT))
-            if write:
+            if given.write:
                 file.write_text(text, encoding='utf-8')
-    state = 'written' if write else 'out of date'
+    state = 'written' if given.write else 'out of date'
     sys.stdout.write(''.join(f'{file}: {state}\n' for file in stale) or 'up to date\n')
-    return int(bool(stale) and not write)
+    return int(bool(stale) and not given.write)
 
 
 if __name__ == '__main__':

@@ -1,6 +1,7 @@
-"""pip and colcon install the same executables and share files, from a copy of this tree."""
+"""pip and colcon install the same executables and share files from a copy of the sources."""
 
 import ast
+from fnmatch import fnmatch
 from importlib.util import find_spec
 import json
 import os
@@ -18,10 +19,10 @@ pytestmark = pytest.mark.xdist_group('install')
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = 'disc_sim_ros'
-TALK_ROS = {'sim_node', 'recorder_node', 'demo'}  # the only executables that may need rclpy
+USE_ROS = {'sim_node', 'recorder_node', 'demo'}  # the only executables that may import rclpy
 SHARED = ('config', 'launch', 'urdf', 'rviz')
 
-# What a virtual environment, a sourced ROS or the ROS wheels hand down to the programs they start.
+# Variables that child processes inherit from a virtual environment, a sourced ROS or ROS wheels.
 INHERITED = re.compile(
     r'PYTHON|VIRTUAL_ENV|_?ROS_|AMENT_|COLCON_|CMAKE_PREFIX_PATH|LD_LIBRARY_PATH|NUMBA_|MAKE|MFLAGS'
 )
@@ -47,15 +48,15 @@ def run(*command, cwd: Path, code: int = 0, **more: str) -> str:
 
 
 def executables() -> dict[str, str]:
-    """The list in setup.py, read without running it."""
+    """Return the table EXECUTABLES of setup.py, read without running the file."""
     for node in ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8')).body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'EXECUTABLES':
             return ast.literal_eval(node.value)
-    raise AssertionError('setup.py has no list EXECUTABLES')
+    raise AssertionError('setup.py has no table EXECUTABLES')
 
 
 def source_files() -> list[Path]:
-    """What a checkout holds; without git, all but what the tools make."""
+    """Return the files of a checkout; without git, all files that .gitignore does not list."""
     listed = None
     if shutil.which('git'):
         listed = subprocess.run(
@@ -68,17 +69,28 @@ def source_files() -> list[Path]:
     if listed and listed.returncode == 0:
         names = [Path(name) for name in listed.stdout.split('\0') if name]
     else:
-        made = re.compile(
-            r'\.(venv|git|hypothesis|.*_cache)|build|dist|install|log|flights|bags|.*\.egg-info'
-        )
-        names = [
-            path.relative_to(ROOT)
-            for top in ROOT.iterdir()
-            if not made.fullmatch(top.name)
-            for path in ([top] if top.is_file() else top.rglob('*'))
-            if '__pycache__' not in path.parts
-        ]
+        names = unignored_files()
     return [name for name in names if (ROOT / name).is_file()]
+
+
+def unignored_files() -> list[Path]:
+    """Return all files that no pattern of .gitignore matches, relative to the root."""
+    lines = (ROOT / '.gitignore').read_text(encoding='utf-8').splitlines()
+    patterns = ['/.git', *(line.removesuffix('/') for line in lines if not line.startswith('#'))]
+    names = []
+    for folder, folders, files in os.walk(ROOT):
+        place = Path(folder).relative_to(ROOT)
+        folders[:] = [name for name in folders if not ignored(place / name, patterns)]
+        names += [place / name for name in files if not ignored(place / name, patterns)]
+    return names
+
+
+def ignored(path: Path, patterns: list[str]) -> bool:
+    """Return True if a pattern matches the name, or the whole path if it begins with a slash."""
+    return any(
+        fnmatch(f'/{path.as_posix()}' if pattern.startswith('/') else path.name, pattern)
+        for pattern in patterns
+    )
 
 
 def copy_source(target: Path) -> Path:
@@ -86,6 +98,13 @@ def copy_source(target: Path) -> Path:
         (target / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, target / name)
     return target
+
+
+def test_without_git_the_sources_are_the_same():
+    """The tree of a git checkout and that of a downloaded archive are installed alike."""
+    if not (shutil.which('git') and (ROOT / '.git').exists()):
+        pytest.skip('this is not a git checkout')
+    assert set(unignored_files()) == set(source_files())
 
 
 def check_files(prefix: Path) -> None:
@@ -110,22 +129,22 @@ def check_package_data(site: Path) -> None:
 
 @pytest.fixture(scope='module')
 def pip_prefix(tmp_path_factory) -> Path:
-    """A fresh virtual environment without ROS, with a space in every path."""
+    """Return a fresh virtual environment without ROS; every path has a space in it."""
     folder = tmp_path_factory.mktemp('with pip')
     source = copy_source(folder / 'a source')
     prefix = folder / 'a prefix'
     venv.create(prefix, with_pip=True, symlinks=True)
-    # Compiling all of matplotlib and numba to bytecode would double the time of this test.
+    # Compiling matplotlib and numba to bytecode would double the time of this test.
     run(prefix / 'bin/python', '-m', 'pip', 'install', '--no-compile', source, cwd=folder)
     return prefix
 
 
 @pytest.fixture(scope='module')
 def colcon_workspace(tmp_path_factory) -> Path:
-    """A workspace that colcon has built, with the Python and the tools of this environment."""
+    """Return a workspace built by the colcon of this environment, for its Python."""
     workspace = tmp_path_factory.mktemp('colcon')
     copy_source(workspace / 'src' / PACKAGE)
-    # colcon writes the path of its Python into scripts that no shell reads where it has a space.
+    # colcon writes the path of its Python into scripts; with a space in it, no shell runs them.
     environment = workspace / 'environment'
     environment.symlink_to(sys.prefix)
     colcon = (environment / 'bin/python', environment / 'bin/colcon')
@@ -135,7 +154,7 @@ def colcon_workspace(tmp_path_factory) -> Path:
 
 
 def run_sourced(workspace: Path, *command, **more: str) -> str:
-    """Run a command in the workspace after sourcing it, as `ros2 run` needs it."""
+    """Run a command in the workspace after sourcing it, as for `ros2 run`."""
     script = '. install/setup.sh && exec "$@"'
     return run('sh', '-c', script, 'sh', *command, cwd=workspace, **more)
 
@@ -189,14 +208,14 @@ def test_pip_metadata(pip_prefix):
 
 
 @pytest.mark.packaging
-def test_executables_that_do_not_talk_ros_run_without_it(pip_prefix):
+def test_executables_without_ros_run_where_ros_is_not_installed(pip_prefix):
     run(pip_prefix / 'bin/python', '-c', 'import rclpy', cwd=pip_prefix, code=1)
-    for name in sorted(set(executables()) - TALK_ROS):
+    for name in sorted(set(executables()) - USE_ROS):
         assert 'usage' in run(pip_prefix / 'bin' / name, '--help', cwd=pip_prefix).lower()
 
 
 @pytest.mark.packaging
-def test_fly_flies_after_pip_without_a_place_for_compiled_code(pip_prefix):
+def test_fly_flies_after_pip_where_no_folder_can_hold_compiled_code(pip_prefix):
     command = [pip_prefix / 'lib' / PACKAGE / 'fly', '--json']
     nowhere = clean_environment() | {'XDG_CACHE_HOME': '/proc/nonexistent'}
     nowhere.pop('HOME', None)
@@ -212,13 +231,13 @@ def test_colcon_installs_all_files(colcon_workspace):
     prefix = colcon_workspace / 'install' / PACKAGE
     check_files(prefix)
     check_package_data(next((prefix / 'lib').glob('python3*/site-packages')))
-    # Only there when colcon took the package for a ROS package and not for plain Python.
+    # This file exists only if colcon recognised a ROS package, not a plain Python one.
     assert (prefix / f'share/{PACKAGE}/hook/ament_prefix_path.sh').is_file()
 
 
 @pytest.mark.packaging
-def test_python_finds_what_colcon_installed(colcon_workspace):
-    """Not the editable install of this environment, or the tests below would prove nothing."""
+def test_python_imports_the_package_that_colcon_installed(colcon_workspace):
+    """With the editable install of this environment the tests below would prove nothing."""
     python = colcon_workspace / 'environment/bin/python'
     found = run_sourced(
         colcon_workspace, python, '-P', '-c', f'import {PACKAGE}; print({PACKAGE}.__file__)'
@@ -229,7 +248,7 @@ def test_python_finds_what_colcon_installed(colcon_workspace):
 @pytest.mark.packaging
 def test_executables_run_after_colcon(colcon_workspace):
     programs = colcon_workspace / 'install' / PACKAGE / 'lib' / PACKAGE
-    without_ros = TALK_ROS if find_spec('rclpy') is None else set()
+    without_ros = USE_ROS if find_spec('rclpy') is None else set()
     for name in sorted(set(executables()) - without_ros):
         assert 'usage' in run_sourced(colcon_workspace, programs / name, '--help').lower()
 
@@ -237,6 +256,6 @@ def test_executables_run_after_colcon(colcon_workspace):
 @pytest.mark.packaging
 def test_fly_flies_after_colcon(colcon_workspace):
     fly = colcon_workspace / 'install' / PACKAGE / 'lib' / PACKAGE / 'fly'
-    # The pip install proves the compiled flight; here it would only be compiled once more.
+    # The test of pip covers compiled code; compiling again here would only take time.
     document = run_sourced(colcon_workspace, fly, '--json', NUMBA_DISABLE_JIT='1')
     assert json.loads(document)['landed'] is True
