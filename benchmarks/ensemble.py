@@ -29,7 +29,8 @@ import numpy as np
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.ensemble import fly_many
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.quantities import LAUNCH
 from flights import ALLOWED, FIG_5, NEIGHBOURS, cpu_name, landing_of_reference, time_per_flight
 from lines import Line, number, print_lines
 import numpy_flights
@@ -136,7 +137,7 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
 def landing_errors(setup: Setup, references: list[list[float]]) -> list[float]:
     """Return how far off the launches of NEAR and FAR land [m]."""
     launches = (*NEAR, *FAR)
-    found = fly_many({name: [getattr(x, name) for x in launches] for name in LIMITS}, setup)
+    found = fly_many({name: [getattr(x, name) for x in launches] for name in LAUNCH}, setup)
     ends = zip(found.x, found.y, found.z, strict=True)
     return [math.dist(end, landing) for end, landing in zip(ends, references, strict=True)]
 

@@ -1,4 +1,4 @@
-"""Errors that this package raises on purpose; each carries one line that a user can act on."""
+"""Every exception class of the package; each message is one line that a user can act on."""
 
 import reprlib
 from typing import Self
@@ -10,51 +10,68 @@ _SHORT.maxstring = _SHORT.maxother = 60
 
 
 class DiscSimError(Exception):
-    """Base of every error raised on purpose."""
+    """Base class of every error that this package raises on purpose."""
 
 
 class ConfigError(DiscSimError, ValueError):
-    """A value from a user (a flag, a YAML key, a parameter) is not allowed."""
+    """A value from a user (a flag, a YAML key, a parameter, an argument) is not allowed.
 
-    def __init__(self, thing: str, value: object, allowed: str) -> None:
-        """Name the `thing`, the `value` it had and what is `allowed`."""
+    Attributes:
+        thing: The name under which the user gave the value.
+        value: The refused value.
+        allowed: What is allowed, a part of a sentence.
+        quantity: Name of the quantity in the table `disc_sim_ros.quantities`, or empty. A command
+            line, a node or a file reader replaces `thing` by its own name of the quantity.
+    """
+
+    def __init__(self, thing: str, value: object, allowed: str, quantity: str = '') -> None:
+        """Write the message from the `thing`, its `value` and what is `allowed`."""
         self.thing = thing
         self.value = value
         self.allowed = allowed
+        self.quantity = quantity
         super().__init__(f'{thing}: {brief(value)} is not allowed; {allowed}')
 
-    def __reduce__(self) -> tuple[type[Self], tuple[str, object, str]]:
-        """Let it come home from another process, which hands over the arguments."""
-        return type(self), (self.thing, self.value, self.allowed)
+    def __reduce__(self) -> tuple[type[Self], tuple[str, object, str, str]]:
+        """Return what another process needs to build the same error."""
+        return type(self), (self.thing, self.value, self.allowed, self.quantity)
+
+    def named(self, thing: str) -> 'ConfigError':
+        """Return the same error under another name of the thing."""
+        return ConfigError(thing, self.value, self.allowed, self.quantity)
 
 
 class IntegrationError(DiscSimError, ArithmeticError):
     """A flight left the range of numbers that the integration can follow."""
 
 
+class BagError(DiscSimError):
+    """A bag cannot be written, read or repaired; the message says which bag, where and why."""
+
+
+class DamageError(BagError):
+    """The bytes of a part of a file contradict the format or the checksum."""
+
+
+class WriteError(BagError):
+    """The operating system refuses to write a bag.
+
+    Attributes:
+        reason: The reason of the system, without the name of the bag.
+    """
+
+    def __init__(self, message: str, reason: str) -> None:
+        """Keep the message and its `reason`."""
+        self.reason = reason
+        super().__init__(message)
+
+
 def brief(value: object) -> str:
-    """Return `value` as one short line, however large, deep or odd it is."""
+    """Return `value` as one short line, however large or deeply nested it is."""
     if isinstance(value, float):
         return f'{value:.12g}'
     try:
         text = ' '.join(_SHORT.repr(value).split())
-    except ValueError:  # Python does not write out whole numbers of thousands of digits
+    except ValueError:  # Python does not print whole numbers of thousands of digits
         return 'a number of thousands of digits'
     return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 3]}...'
-
-
-class BagError(DiscSimError):
-    """A bag cannot be written, read or repaired; one line says which, where and why."""
-
-
-class DamageError(BagError):
-    """A part of a file is not what it says it is."""
-
-
-class WriteError(BagError):
-    """The system refuses to write a bag."""
-
-    def __init__(self, message: str, reason: str) -> None:
-        """Keep the `reason` alone too."""
-        self.reason = reason
-        super().__init__(message)

@@ -5,6 +5,7 @@ Names are relative, so that namespaces and remapping work, except for those that
 
 from dataclasses import dataclass
 import re
+from typing import ClassVar
 
 from disc_sim_ros.errors import ConfigError
 
@@ -53,7 +54,14 @@ class Frames:
         disc: At the centre of the disc, tilts with it, does not spin; x forward, y left, z up.
         disc_body: Fixed in the plastic: `disc` turned about z by the spin.
         disc_air: As `disc`, x along the velocity through the air in the plane of the disc.
+        PREFIX: The prefixes that tf2 and viewers accept.
+        PREFIX_RULE: The same in words, a part of a sentence.
     """
+
+    PREFIX: ClassVar[re.Pattern[str]] = re.compile(r'([A-Za-z]\w*/)*([A-Za-z]\w*)?', re.ASCII)
+    PREFIX_RULE: ClassVar[str] = (
+        'names of letters, digits and _ after a letter, joined by /, such as red/ or red_'
+    )
 
     map: str = 'map'
     disc: str = 'disc'
@@ -67,9 +75,8 @@ class Frames:
         Raises:
             ConfigError: A prefix that tf2 or a viewer would stumble over.
         """
-        if not re.fullmatch(r'([A-Za-z0-9_][A-Za-z0-9_/.-]*)?', frame_prefix):
-            allowed = "use letters, digits and _ / . -, and do not begin with '/'; such as 'red/'"
-            raise ConfigError('frame_prefix', frame_prefix, allowed)
+        if not cls.PREFIX.fullmatch(frame_prefix):
+            raise ConfigError('frame_prefix', frame_prefix, f'give {cls.PREFIX_RULE}')
         plain = cls()
         return cls(
             disc=frame_prefix + plain.disc,

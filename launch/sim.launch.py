@@ -43,17 +43,17 @@ def generate_launch_description() -> LaunchDescription:
         for name, (default, text) in ARGUMENTS.items()
     ]
     passed_on = [
-        DeclareLaunchArgument(entry.name, default_value=NOT_GIVEN, description=description(entry))
-        for entry in TABLE
+        DeclareLaunchArgument(spec.name, default_value=NOT_GIVEN, description=description(spec))
+        for spec in TABLE
     ]
     return LaunchDescription([*own, *passed_on, OpaqueFunction(function=nodes)])
 
 
-def description(entry: ParameterSpec) -> str:
-    """Return what a parameter means, what is allowed, and its default."""
-    allowed = f'{allowed_text(entry)} {entry.unit}'.strip()
-    parts = (allowed, entry.constraint, f'default {plain(entry.default)!r}')
-    text = f'{entry.meaning} [{"; ".join(part for part in parts if part)}]'
+def description(spec: ParameterSpec) -> str:
+    """Return the meaning of a parameter, its range and its default."""
+    allowed = f'{allowed_text(spec)} {spec.unit}'.strip()
+    parts = (allowed, spec.constraint, f'default {plain(spec.default)!r}')
+    text = f'{spec.meaning} [{"; ".join(part for part in parts if part)}]'
     return text.replace('`', '')
 
 
@@ -94,7 +94,7 @@ def nodes(context: LaunchContext) -> list[Node]:
 
 def given_parameters(arguments: dict[str, str]) -> dict[str, Any]:
     """Return the parameters of sim_node that were given as arguments, read as YAML."""
-    given = {entry.name: arguments[entry.name] for entry in TABLE}
+    given = {spec.name: arguments[spec.name] for spec in TABLE}
     return {name: yaml.safe_load(text) for name, text in given.items() if text != NOT_GIVEN}
 
 

@@ -1,6 +1,7 @@
 """The whole envelope as hypothesis strategies: launches, discs, models, winds, commands.
 
-Launches are drawn from `launch.LIMITS`, with their ends and the corners of the flow among them.
+Launches are drawn from `quantities.LAUNCH`, with the ends of the ranges and the corners of the
+flow among them.
 """
 
 import dataclasses
@@ -15,8 +16,9 @@ from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, NO_CONTROL, Setup, fly
 from disc_sim_ros.physics.kernels.equations import DISC, DISC_AIR, DISC_BODY, Control
-from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
+from disc_sim_ros.quantities import LAUNCH
 
 DISCS = {name: disc_file.load_disc(name) for name in disc_file.disc_names()}
 ANGLES = (0.0, 90.0, -90.0, 180.0, -180.0, 89.999, 1e-9, -1e-300)
@@ -36,10 +38,10 @@ def number(lowest, highest, *special):
 
 
 def launches(**bounds):
-    """Launches over LIMITS; `bounds` narrow some of them."""
-    limits = {name: bounds.get(name, (low, high)) for name, (low, high, _) in LIMITS.items()}
+    """Launches over the ranges of the table; `bounds` narrow some of them."""
+    limits = {name: bounds.get(name, (q.lowest, q.highest)) for name, q in LAUNCH.items()}
     special = {
-        name: ANGLES for name, (_, _, unit) in LIMITS.items() if unit == 'degrees'
+        name: ANGLES for name, q in LAUNCH.items() if q.unit == 'degrees'
     } | {'spin': (31.416, -31.416, 1e-9), 'speed': (1e-9, 15.0)}  # fmt: skip
     return st.builds(
         Launch, **{k: number(low, high, *special.get(k, ())) for k, (low, high) in limits.items()}

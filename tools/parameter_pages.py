@@ -1,6 +1,6 @@
-"""The pages made of the parameter tables.
+"""Makes the pages and parameter files of the nodes from their tables of parameters.
 
-`python tools/parameter_pages.py` prints docs/parameters.md; with the word `yaml`
+`python tools/parameter_pages.py` prints docs/parameters.md; with the argument `yaml` it prints
 config/sim.yaml, with `recorder` docs/recorder.md, with `recorder_yaml` config/recorder.yaml.
 """
 
@@ -20,23 +20,24 @@ _PAGE = """\
 
 <!-- Made by: python tools/parameter_pages.py > docs/parameters.md -->
 
-Give them in a file (`config/sim.yaml` holds them all), on the command line or while the node runs:
+Give parameters in a file (`config/sim.yaml` holds all of them), on the command line, or while the
+node runs:
 
     ros2 run disc_sim_ros sim_node --ros-args --params-file my.yaml -p launch.speed:=20
     ros2 param set /sim_node launch.pitch 10
 
-All are checked together, and a change that is impossible with the rest is refused with the reason,
-as a whole: parameters that only fit together, such as `physics_rate` and `publish_rate`, go in one
-`set_parameters_atomically`. A misspelt name in a file or on the command line ends the node with an
-error.
+The node checks all parameters together. It refuses a change that contradicts another parameter, as
+a whole, and states the reason. Set parameters that are only valid together, such as `physics_rate`
+and `publish_rate`, in one `set_parameters_atomically`. A misspelt name in a file or on the command
+line ends the node with an error.
 
-In a file, `/**:` means every node; `sim_node:` would miss a node in a namespace. A whole number
-will do where a double is due. ROS itself refuses a list of mixed numbers, `[0, 0.5, 0]`, so write
-all of them with a point or none; reads a number that starts with 0 as octal, so that 010 is 8; and
-takes an empty text on the command line only as `-p "frame_prefix:=''"`.
+In a file, `/**:` applies to every node; `sim_node:` does not match a node in a namespace. A whole
+number may stand for a double. ROS itself has three traps. It refuses a list of mixed numbers such
+as `[0, 0.5, 0]`; write all of them with a decimal point. It reads a number that starts with 0 as
+octal: 010 is 8. On the command line it accepts an empty text only as `-p "frame_prefix:=''"`.
 
-A parameter whose change takes effect at the next throw keeps its old meaning for the disc that is
-in the air. A fixed one is read-only.
+A change marked `next throw` does not affect the disc that is in the air. A `fixed` parameter is
+read-only.
 """
 
 
@@ -45,47 +46,49 @@ _RECORDER_PAGE = """\
 
 <!-- Made by: python tools/parameter_pages.py recorder > docs/recorder.md -->
 
-Records every topic, as the bytes that arrived, into an MCAP bag that `ros2 bag`, Foxglove and
-`analyse_bag` read ([bags.md](bags.md) says what is in it):
+`recorder_node` writes every topic, as the bytes that arrived, to an MCAP bag for `ros2 bag`,
+Foxglove and `analyse_bag` ([bags.md](bags.md) describes the contents):
 
     ros2 run disc_sim_ros recorder_node --ros-args -p bag:=my_flight
     ros2 run disc_sim_ros recorder_node --ros-args -p exclude:='/rosout|/parameter_events'
 
-Ctrl-C or SIGTERM ends it: what has arrived is written, the bag gets its index, and the last line
-says what is in it. Whatever else ends it (SIGKILL, power) costs at most the messages since the
-last flush, `flush_period`; `repair_bag` makes such a bag whole. A full disk or a folder that is
-removed ends it with exit code 1 and a bag that can be read. An existing bag is never touched: exit
-code 2.
+Ctrl-C or SIGTERM ends it: it writes the messages that have arrived, then the index, and prints a
+summary of the bag. If it is killed or the power fails, at most the messages since the last flush
+(`flush_period`) are lost, and `repair_bag` makes a complete copy of the bag. If the disk is full
+or the folder is removed, it ends with exit code 1 and leaves a readable bag. If the bag exists, it
+ends with exit code 2 and changes nothing.
 
-- **Found** within 0.05 s of the graph knowing it, whatever publishes it, before or after the
-  start. Hidden topics (with a part that begins with `_`) are recorded if `topics` names them, and
-  topics that nobody but the recorder publishes if `topics` or `regex` does. A type that is not
-  installed, or a second type on a topic, is warned of once; the rest goes on.
-- **Asked for** as reliably as all publishers of a topic offer, 5000 messages deep, which is half a
-  second at 10 kHz; if a publisher comes that offers less, a second subscription takes over, and
-  nothing is recorded twice or left out.
-- **Taken** every 10 ms, every 1 ms with `use_sim_time`, by a thread of its own, as bytes.
-- **Stamped** with the time of arrival as log time (of `/clock` with `use_sim_time`; what comes
-  before the first `/clock` waits for it and gets that time, or that of arrival if none comes) and
-  the time of sending as publish time.
-- **Undisturbed** where the wall clock is set: log times go on without the jump, of which it warns.
-  What has stamps of its own keeps them.
-- **Counted**: messages that the middleware lost, numbers missing in the sequence of a publisher
-  that is alone on its topic, and messages dropped because 512 MiB waited for the disk stand in
-  `/diagnostics`, in the log and in `custom_data` of the bag, as `lost`, `gaps` and `dropped` with
-  the topic. A message can be in both `lost` and `gaps`. `/diagnostics` tells once a second also
-  how much is recorded and waits, how late a message was taken, and the room on the disk.
-- **Alone** in its bag: a second recorder of the same name goes on with another bag, and both warn.
+- **Discovery.** A topic is subscribed within 0.05 s after the graph reports it, whether its
+  publisher started before or after the recorder. A hidden topic (a part of its name begins with
+  `_`) is recorded if `topics` names it; a topic that only the recorder publishes is recorded if
+  `topics` or `regex` selects it. A type that is not installed, or a second type on a topic, causes
+  one warning; the other topics are recorded.
+- **Quality of service.** The subscription requests what all publishers of a topic offer, with a
+  depth of 5000 messages: half a second at 10 kHz. If a publisher with a weaker offer appears, a
+  second subscription takes over; no message is lost or recorded twice.
+- **Taking messages.** A thread of its own takes the messages as bytes, every 10 ms, or every 1 ms
+  with `use_sim_time`.
+- **Time stamps.** The log time is the time of arrival; with `use_sim_time` it is the time of
+  `/clock`. The publish time is the time of sending. Messages that arrive before the first `/clock`
+  wait for it and get its time, or the time of arrival if no `/clock` comes.
+- **Jumps of the wall clock.** If the wall clock is set, log times continue without the jump, and
+  the recorder warns. Stamps inside messages are not changed.
+- **Losses.** `/diagnostics`, the log and `custom_data` of the bag report, for each topic: `lost`
+  (lost by the middleware), `gaps` (numbers missing in the sequence of a topic with one publisher)
+  and `dropped` (512 MiB already waited for the disk). A message can be in both `lost` and `gaps`.
+  Once a second `/diagnostics` also reports the amounts recorded and waiting, the greatest delay
+  before a message was taken, and the free space on the disk.
+- **Two recorders.** A second recorder of the same name writes another bag, and both warn.
 
 | service (std_srvs/Trigger) | does |
 |---|---|
-| `~/pause` | record nothing until `~/resume` |
-| `~/resume` | go on, with the last message of each latched publisher that came meanwhile |
+| `~/pause` | stop recording until `~/resume` |
+| `~/resume` | continue; latched messages that arrived during the pause are recorded first |
 | `~/split` | begin the next file of the bag |
-| `~/flush` | bring everything to the disk now |
+| `~/flush` | write all messages to the disk now |
 
-Parameters are fixed when the node starts; `config/recorder.yaml` holds them all. A misspelt name
-ends the node with an error.
+Parameters are fixed when the node starts; `config/recorder.yaml` holds all of them. A misspelt
+name ends the node with an error.
 """
 
 
@@ -107,18 +110,18 @@ def _markdown_group(title: str, group: Iterable[ParameterSpec]) -> str:
     head = (
         '| parameter | default | unit | allowed | change | meaning |\n|---|---|---|---|---|---|\n'
     )
-    return f'\n## {title}\n\n{head}{"".join(_markdown_row(entry) for entry in group)}'
+    return f'\n## {title}\n\n{head}{"".join(_markdown_row(spec) for spec in group)}'
 
 
-def _markdown_row(entry: ParameterSpec) -> str:
-    allowed = '; '.join(part for part in (allowed_text(entry), entry.constraint) if part)
+def _markdown_row(spec: ParameterSpec) -> str:
+    allowed = '; '.join(part for part in (allowed_text(spec), spec.constraint) if part)
     cells = (
-        f'`{entry.name}`',
-        f'`{_yaml_value(entry.default)}`',
-        entry.unit,
+        f'`{spec.name}`',
+        f'`{_yaml_value(spec.default)}`',
+        spec.unit,
         allowed,
-        entry.effect,
-        entry.meaning,
+        spec.effect,
+        spec.meaning,
     )
     return f'| {" | ".join(cells)} |\n'
 
@@ -135,29 +138,29 @@ def recorder_yaml_file() -> str:
 
 def _yaml_file(node: str, groups: Mapping[str, Sequence[ParameterSpec]]) -> str:
     lines = [
-        f'# Every parameter of {node} with its default. Copy it and keep what you change.',
-        '# In brackets: what is allowed, and when a change while the node runs takes effect.',
+        f'# Every parameter of {node} with its default. Copy the file and keep what you change.',
+        '# In brackets: the allowed values, and when a change takes effect while the node runs.',
         '/**:',
         '  ros__parameters:',
     ]
     for title, group in groups.items():
         lines += ['', f'    # ---- {title} ----']
         parent = ''
-        for entry in group:
-            *parents, key = entry.name.split('.')
+        for spec in group:
+            *parents, key = spec.name.split('.')
             indent = ' ' * (4 + 2 * len(parents))
             if parents and parents[0] != parent:
                 parent = parents[0]
                 lines.append(f'    {parent}:')
-            lines += _yaml_comment(entry, f'{indent}# ')
-            lines.append(f'{indent}{key}: {_yaml_value(entry.default)}')
+            lines += _yaml_comment(spec, f'{indent}# ')
+            lines.append(f'{indent}{key}: {_yaml_value(spec.default)}')
     return '\n'.join(lines) + '\n'
 
 
-def _yaml_comment(entry: ParameterSpec, start: str) -> list[str]:
-    allowed = f'{allowed_text(entry)} {entry.unit}'.strip()
-    parts = [part for part in (allowed, entry.constraint, entry.effect) if part]
-    text = f'{entry.meaning} [{"; ".join(parts)}]'.replace('`', '')
+def _yaml_comment(spec: ParameterSpec, start: str) -> list[str]:
+    allowed = f'{allowed_text(spec)} {spec.unit}'.strip()
+    parts = [part for part in (allowed, spec.constraint, spec.effect) if part]
+    text = f'{spec.meaning} [{"; ".join(parts)}]'.replace('`', '')
     return textwrap.wrap(text, 99, initial_indent=start, subsequent_indent=start)
 
 
@@ -175,7 +178,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Print one of the PAGES; without a word the first."""
+    """Print one of the PAGES; without an argument the first."""
     page = validation.choice('page', arguments[0] if arguments else 'markdown', PAGES)
     sys.stdout.write(PAGES[page]())
 

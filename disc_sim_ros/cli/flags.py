@@ -11,6 +11,7 @@ from disc_sim_ros.physics.disc import AERODYNAMICS
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.quantities import LAUNCH
 
 PAPER = 'Crowther & Potts, Sports Engineering 10 (2007) 3-21'
 DEFAULT_DISC = 'frisbee'
@@ -68,14 +69,13 @@ def add_disc(p: Parser) -> None:
 def add_launch(p: Parser) -> None:
     """Add the release."""
     thrown = p.add_argument_group('launch')
-    defaults = launch.Launch()
     for flag, field, metavar, text in LAUNCH_FLAGS:
-        lowest, highest, unit = launch.LIMITS[field]
-        add_number(thrown, flag, getattr(defaults, field), lowest, highest, unit, metavar, text)
+        q = LAUNCH[field]
+        add_number(thrown, flag, q.default, q.lowest, q.highest, q.unit, metavar, text)
     spin = thrown.add_mutually_exclusive_group()
-    lowest, highest, unit = launch.LIMITS['spin']
+    q = LAUNCH['spin']
     text = 'clockwise from above positive'
-    add_number(spin, '--spin', defaults.spin, lowest, highest, unit, 'RAD/S', text)
+    add_number(spin, '--spin', q.default, q.lowest, q.highest, q.unit, 'RAD/S', text)
     spin.add_argument(
         '--advance-ratio',
         type=number(-100.0, 100.0, ''),
@@ -175,7 +175,7 @@ def parameters(
         'publish_rate': rate / math.ceil(rate / PUBLISH_RATE),
         'air_density': setup.air.density,
         'gravity': setup.air.gravity,
-        **{f'launch.{field}': float(getattr(release, field)) for field in launch.LIMITS},
+        **{f'launch.{field}': float(getattr(release, field)) for field in LAUNCH},
         'wind.x': x,
         'wind.y': y,
         'wind.z': z,

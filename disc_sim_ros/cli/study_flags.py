@@ -10,8 +10,10 @@ from disc_sim_ros.cli.arguments import Parser, number
 from disc_sim_ros.errors import ConfigError, brief
 from disc_sim_ros.physics import ensemble, flight
 from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.studies.columns import QUANTITIES, Quantity, quantity
+from disc_sim_ros.quantities import VARIED
+from disc_sim_ros.studies.columns import quantity
 from disc_sim_ros.studies.scatter import Normal, Uniform
+from disc_sim_ros.validation import Quantity
 
 MOST_VALUES = 100_000  # of one grid quantity
 _FORMS = 'give NAME=START:STOP:STEP, NAME=START:STOP/N or NAME=A,B,C'
@@ -19,7 +21,7 @@ _FORMS = 'give NAME=START:STOP:STEP, NAME=START:STOP/N or NAME=A,B,C'
 
 def names_text() -> str:
     """Return the names of all quantities with their units, for the end of a help page."""
-    told = [f'{q.name} ({q.unit})' if q.unit else q.name for q in QUANTITIES.values()]
+    told = [f'{q.name} ({q.unit})' if q.unit else q.name for q in VARIED.values()]
     return f'NAME is one of {", ".join(told)}.'
 
 

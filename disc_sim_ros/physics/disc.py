@@ -1,8 +1,7 @@
-"""What a disc is: mass, size, inertia and aerodynamic coefficients, checked on construction."""
+"""A disc: mass, size, inertia and aerodynamic coefficients, checked on construction."""
 
 from dataclasses import dataclass
 from functools import cached_property
-import math
 from typing import Self
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
 
 AERODYNAMICS = ('table', 'linear')
 
@@ -20,7 +20,10 @@ class LinearAero:
     """Steady coefficients as straight lines in alpha, and drag as a parabola; per radian.
 
     C_Lift = CL_0 + CL_alpha a; C_Drag = CD_0 + CD_alpha (a - alpha_0)^2; C_M = CM_0 + CM_alpha a.
-    Not limited: far from the fitted range the lines go on. Source: paper, Fig. 3.
+    Not limited: outside the fitted range the lines continue. Source: paper, Fig. 3.
+
+    Raises:
+        ConfigError: A number is not finite, or `CD_0` or `CD_alpha` is negative.
     """
 
     CL_0: float
@@ -32,9 +35,8 @@ class LinearAero:
     CM_alpha: float
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            lowest = 0.0 if name in {'CD_0', 'CD_alpha'} else -math.inf
-            validation.number(name, getattr(self, name), lowest)
+        for name, quantity in LINEAR_AERO.items():
+            quantity.check(getattr(self, name))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,10 +85,10 @@ class AeroTable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpinTable:
-    """A coefficient that the spin causes, over advance ratio and angle of attack.
+    """A coefficient caused by the spin, over advance ratio and angle of attack.
 
-    Bilinear inside, held constant outside. A spin the other way round turns the sign, so that the
-    mirrored flight is the mirrored flight; the row without spin is therefore 0.
+    Bilinear inside the table, held constant outside. The opposite spin gives the opposite sign,
+    so that the mirrored throw flies the mirrored path; the row without spin is therefore 0.
 
     Attributes:
         advance_ratio: r c / (2 V), ascending from 0, shape (m,).
@@ -105,7 +107,12 @@ class SpinTable:
 
     @classmethod
     def of(cls, *, advance_ratio: ArrayLike, alpha_deg: ArrayLike, coefficient: object) -> Self:
-        """Build a table from its two axes and one row of coefficients per advance ratio."""
+        """Build a table from its two axes and one row of coefficients per advance ratio.
+
+        Raises:
+            ConfigError: An axis does not ascend, the advance ratio does not begin at 0, a row has
+                the wrong length, or the row without spin is not 0.
+        """
         ratio = validation.ascending(
             'advance_ratio', validation.column('advance_ratio', advance_ratio)
         )
@@ -142,10 +149,10 @@ class Disc:
     area: float  # m^2, the paper's S
     inertia_axial: float  # kg m^2, I_z
     inertia_diametral: float  # kg m^2, I_x = I_y
-    C_Lp: float = 0.0  # roll damping, per p c / (2 V)
-    C_Mq: float = 0.0  # pitch damping, per q c / (2 V)
-    C_Nr: float = 0.0  # spin damping, per r c / (2 V)
-    aero: str = 'table'  # the aerodynamics flown unless another is asked for
+    C_Lp: float = DAMPING['C_Lp'].default  # roll damping, per p c / (2 V)
+    C_Mq: float = DAMPING['C_Mq'].default  # pitch damping, per q c / (2 V)
+    C_Nr: float = DAMPING['C_Nr'].default  # spin damping, per r c / (2 V)
+    aero: str = 'table'  # the coefficients used unless a Setup names others
     table: AeroTable | None = None
     linear: LinearAero | None = None
     spin_roll_moment: SpinTable | None = None  # rolling moment in axes 3
@@ -153,14 +160,12 @@ class Disc:
     description: str = ''
 
     def __post_init__(self) -> None:
-        for name in ('mass', 'diameter', 'area', 'inertia_axial', 'inertia_diametral'):
-            validation.number(name, getattr(self, name), above=0.0, unit=_UNITS[name])
-        for name in ('C_Lp', 'C_Mq', 'C_Nr'):
-            validation.number(name, getattr(self, name), highest=0.0)
-        # No body has I_z > I_x + I_y; the flat one has equality, to rounding.
+        for name, quantity in (DISC | DAMPING).items():
+            quantity.check(getattr(self, name))
+        # No body has I_z > I_x + I_y; a flat one has equality, to rounding.
         if self.inertia_axial > 2.0 * self.inertia_diametral * (1 + 1e-9):
             allowed = f'at most twice inertia_diametral, {2 * self.inertia_diametral:g} kg m^2'
-            raise ConfigError('inertia_axial', self.inertia_axial, allowed)
+            raise ConfigError('inertia_axial', self.inertia_axial, allowed, 'inertia_axial')
         validation.choice('aero', self.aero, AERODYNAMICS)
         if not self.has(self.aero):
             held = [kind for kind in AERODYNAMICS if self.has(kind)]
@@ -168,7 +173,7 @@ class Disc:
             raise ConfigError('aero', self.aero, allowed)
 
     def has(self, aero: str) -> bool:
-        """Say whether the disc holds coefficients of the kind `aero`."""
+        """Return True if the disc holds coefficients of the kind `aero`."""
         return (self.table if aero == 'table' else self.linear) is not None
 
     def steepest_moment(self, aero: str) -> float:
@@ -183,8 +188,8 @@ class Disc:
         """Return the table as `aerodynamics.table_coefficients` takes it, shape (n, 8).
 
         Columns are alpha [rad], C_Lift, C_Drag, C_M, the alpha of the next row, and the slopes of
-        the three coefficients up to there [1/rad]; in the last row nobody reads those. A disc
-        without a table gets rows that nobody reads.
+        the three coefficients up to there [1/rad]. The slopes of the last row are not used, nor
+        are the two rows of a disc without a table.
         """
         if self.table is None:
             return np.array([[-np.pi, 0, 0, 0, np.pi, 0, 0, 0], [np.pi, 0, 0, 0, np.inf, 0, 0, 0]])
@@ -195,9 +200,10 @@ class Disc:
 
     @cached_property
     def spin_terms(self) -> FloatArray:
-        """Return what the spin causes as `aerodynamics.spin_coefficients` takes it; may be empty.
+        """Return the spin tables as `aerodynamics.spin_coefficients` takes them; may be empty.
 
-        Both tables are written on the rows and columns of either: bilinear stays bilinear.
+        Both tables are interpolated to the advance ratios and angles of both, which changes no
+        value between them.
         """
         tables = (self.spin_roll_moment, self.spin_side_force)
         given = [table for table in tables if table is not None]
@@ -214,12 +220,3 @@ class Disc:
                 high = [np.interp(ratio, table.advance_ratio, c) for c in np.transpose(wide)]
                 term[1:, 1:] = np.transpose(high)
         return terms
-
-
-_UNITS = {
-    'mass': 'kg',
-    'diameter': 'm',
-    'area': 'm^2',
-    'inertia_axial': 'kg m^2',
-    'inertia_diametral': 'kg m^2',
-}

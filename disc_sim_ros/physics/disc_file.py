@@ -1,11 +1,11 @@
-"""The disc catalogue: YAML files, one a disc, in the package or the user's own.
+"""Disc files: YAML files, one for each disc, of the catalogue in the package or of a user.
 
-A file may start from another disc with `based_on: NAME` and then gives only what differs. Every
-key carries its unit; an unknown, doubled, missing or impossible one is refused with file, key and
-reason.
+A file may start from a disc of the catalogue with `based_on: NAME` and then holds only the
+differences. Every key carries its unit. An unknown, repeated, missing or impossible key is
+refused with file, key and reason.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 import difflib
 from importlib.resources import files
 import math
@@ -17,34 +17,23 @@ import yaml
 
 from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError, brief
-from disc_sim_ros.physics.disc import AeroTable, Disc, LinearAero, SpinTable
+from disc_sim_ros.physics.disc import AERODYNAMICS, AeroTable, Disc, LinearAero, SpinTable
+from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
+from disc_sim_ros.validation import Quantity
 
 _FOLDER = files('disc_sim_ros.physics') / 'discs'
 _LONGEST_NAME = 100  # of a file, in a message
 _LARGEST_FILE = 1 << 17  # bytes; the largest disc of the package has 4 kB, and 1 MB takes seconds
 
-_PROPERTIES = {
-    'mass_kg': 'mass',
-    'diameter_m': 'diameter',
-    'area_m2': 'area',
-    'inertia_axial_kg_m2': 'inertia_axial',
-    'inertia_diametral_kg_m2': 'inertia_diametral',
-}
-_DAMPING = {'C_Lp': 'C_Lp', 'C_Mq': 'C_Mq', 'C_Nr': 'C_Nr'}
-_LINEAR = {
-    'CL_0': 'CL_0',
-    'CL_alpha_per_rad': 'CL_alpha',
-    'CD_0': 'CD_0',
-    'CD_alpha_per_rad2': 'CD_alpha',
-    'alpha_0_rad': 'alpha_0',
-    'CM_0': 'CM_0',
-    'CM_alpha_per_rad': 'CM_alpha',
-}
-_TABLE = {'alpha_deg': 'alpha_deg', 'CL': 'CL', 'CD': 'CD', 'CM': 'CM'}
-_SPIN = {'advance_ratio': 'advance_ratio', 'alpha_deg': 'alpha_deg', 'coefficient': 'coefficient'}
-_SECTIONS: dict[str, dict[str, str]] = {
-    'damping': _DAMPING,
-    'linear': _LINEAR,
+_PROPERTIES = {quantity.key: quantity for quantity in DISC.values()}
+_DAMPING = {quantity.key: quantity for quantity in DAMPING.values()}
+_LINEAR = {quantity.key: quantity for quantity in LINEAR_AERO.values()}
+_NUMBERS: dict[str, dict[str, Quantity]] = {'damping': _DAMPING, 'linear': _LINEAR}
+_TABLE = ('alpha_deg', 'CL', 'CD', 'CM')
+_SPIN = ('advance_ratio', 'alpha_deg', 'coefficient')
+_SECTIONS: dict[str, tuple[str, ...]] = {
+    'damping': tuple(_DAMPING),
+    'linear': tuple(_LINEAR),
     'table': _TABLE,
     'spin_roll_moment': _SPIN,
     'spin_side_force': _SPIN,
@@ -56,7 +45,7 @@ _BUILDERS: dict[str, Callable[..., Any]] = {
     'spin_side_force': SpinTable.of,
 }
 _KEYS = ('description', 'based_on', 'aero', *_PROPERTIES, *_SECTIONS)
-_OPTIONAL = {'area_m2', 'C_Lp', 'C_Mq', 'C_Nr'}
+_OPTIONAL = {DISC['area'].key, *_DAMPING}
 
 
 def disc_names() -> tuple[str, ...]:
@@ -69,7 +58,7 @@ def load_disc(name_or_file: str) -> Disc:
     """Return a disc of the catalogue by name, or one from a user's YAML file.
 
     Args:
-        name_or_file: A name as `names` lists them, or a path that ends in .yaml or .yml.
+        name_or_file: A name of `disc_names`, or a path that ends in .yaml or .yml.
 
     Raises:
         ConfigError: No such disc or file, or a file that does not describe a disc; the message
@@ -78,7 +67,7 @@ def load_disc(name_or_file: str) -> Disc:
     path = Path(name_or_file)
     if path.suffix in {'.yaml', '.yml'}:
         source = _shown(name_or_file)
-        name = path.stem.encode(errors='replace').decode()  # what is no text cannot be drawn
+        name = path.stem.encode(errors='replace').decode()  # plots cannot draw lone surrogates
         return _disc(name, _merged(_read(name_or_file, path), source), source)
     return _disc(name_or_file, _entry(name_or_file), name_or_file)
 
@@ -86,33 +75,40 @@ def load_disc(name_or_file: str) -> Disc:
 def disc_document(disc: Disc) -> dict[str, Any]:
     """Return a disc as the keys and values of a disc file, complete and exact.
 
-    `from_document` makes the very same disc of it, to the last bit.
+    `disc_from_document` makes the same disc from it, to the last bit.
     """
-    found: dict[str, Any] = {'description': disc.description, 'aero': disc.aero}
-    found |= {key: float(getattr(disc, name)) for key, name in _PROPERTIES.items()}
-    found['damping'] = {key: float(getattr(disc, name)) for key, name in _DAMPING.items()}
+    document: dict[str, Any] = {'description': disc.description, 'aero': disc.aero}
+    document |= _numbers_of(disc, _PROPERTIES)
+    document['damping'] = _numbers_of(disc, _DAMPING)
     if disc.linear is not None:
-        found['linear'] = {k: float(getattr(disc.linear, name)) for k, name in _LINEAR.items()}
+        document['linear'] = _numbers_of(disc.linear, _LINEAR)
     if disc.table is not None:
-        columns = disc.table.coefficients.T.tolist()
-        found['table'] = {
-            'alpha_deg': disc.table.alpha_deg.tolist(),
-            **dict(zip(('CL', 'CD', 'CM'), columns, strict=True)),
+        columns = [disc.table.alpha_deg, *disc.table.coefficients.T]
+        document['table'] = {
+            key: values.tolist() for key, values in zip(_TABLE, columns, strict=True)
         }
     for section in ('spin_roll_moment', 'spin_side_force'):
         terms: SpinTable | None = getattr(disc, section)
         if terms is not None:
-            found[section] = {key: getattr(terms, key).tolist() for key in _SPIN}
-    return found
+            document[section] = {key: getattr(terms, key).tolist() for key in _SPIN}
+    return document
+
+
+def _numbers_of(thing: Disc | LinearAero, keys: Mapping[str, Quantity]) -> dict[str, float]:
+    return {key: float(getattr(thing, quantity.name)) for key, quantity in keys.items()}
 
 
 def disc_from_document(name: str, keys: dict[str, Any]) -> Disc:
-    """Return the disc of a `document`; raises ConfigError as `load` does."""
+    """Return the disc of a `disc_document`.
+
+    Raises:
+        ConfigError: As of `load_disc`; `name` stands for the file.
+    """
     return _disc(name, dict(keys), name)
 
 
 def _entry(name: str) -> dict[str, Any]:
-    """Return the keys of a disc of the package, with those of the disc it is based on."""
+    """Return the keys of a disc of the package, completed from the disc that it is based on."""
     if name not in disc_names():
         close = difflib.get_close_matches(name, disc_names(), n=1)
         guess = f'did you mean {close[0]}? ' if close else ''
@@ -122,9 +118,9 @@ def _entry(name: str) -> dict[str, Any]:
 
 
 def _merged(keys: dict[str, Any], source: str) -> dict[str, Any]:
-    """Return `keys` over those of the disc that it is based on; sections are merged by key.
+    """Return `keys`, completed from the disc of `based_on`; sections are merged key by key.
 
-    Tables replace each other whole: half a table of one disc and half of another is none.
+    A table replaces the other table as a whole: half a table of each disc would mean nothing.
     """
     base_name = keys.pop('based_on', None)
     if base_name is None:
@@ -155,15 +151,15 @@ def _read(name: str, path: Path) -> dict[str, Any]:
 
 
 def _head(path: Path) -> bytes:
-    """Return the bytes of a file, of a large one only as many as show that it is too large."""
-    if path.exists() and not path.is_file():  # a pipe would wait, a device may never end
+    """Return the bytes of a file; of a too large file only the first, enough to refuse it."""
+    if path.exists() and not path.is_file():  # reading a pipe or a device may never end
         raise OSError(0, 'not a file')
     with path.open('rb') as file:
         return file.read(_LARGEST_FILE + 1)
 
 
 def _shown(name: str) -> str:
-    """Return the name of a file for a message: one line, of a long one the end."""
+    """Return the name of a file for a message: one line, shortened to its end."""
     text = name if name.isprintable() else repr(name)[1:-1]
     return text if len(text) <= _LONGEST_NAME else f'...{text[-_LONGEST_NAME:]}'
 
@@ -185,52 +181,47 @@ def _parse(name: str, text: str) -> dict[str, Any]:
 
 def _disc(name: str, keys: dict[str, Any], source: str) -> Disc:
     """Build a disc from the keys of a file; `source` names the file in messages."""
-    known: dict[str, Any] = {'name': name}
+    fields: dict[str, Any] = {'name': name}
     try:
         _refuse_unknown(keys, _KEYS, '')
         _require(keys, _PROPERTIES, '')
-        known['description'] = validation.text('description', keys.get('description', ''))
-        for key, attribute in _PROPERTIES.items():
+        fields['description'] = validation.text('description', keys.get('description', ''))
+        for key, quantity in _PROPERTIES.items():
             if key in keys:
-                known[attribute] = validation.number(key, keys[key], above=0.0)
-        known.setdefault('area', math.pi * known['diameter'] * known['diameter'] / 4)
-        for section, fields in _SECTIONS.items():
+                fields[quantity.name] = quantity.check(keys[key], key)
+        fields.setdefault('area', math.pi * fields['diameter'] * fields['diameter'] / 4)
+        for section, names in _SECTIONS.items():
             if section in keys:
-                known.update(_section(section, keys[section], fields))
+                fields.update(_section(section, keys[section], names))
         aero = 'table' if 'table' in keys else 'linear'
-        known['aero'] = validation.choice('aero', keys.get('aero', aero), ('table', 'linear'))
-        return Disc(**known)
+        fields['aero'] = validation.choice('aero', keys.get('aero', aero), AERODYNAMICS)
+        return Disc(**fields)
     except ConfigError as error:
-        thing = _YAML_KEYS.get(error.thing, error.thing)
-        raise ConfigError(f'{source}: {thing}', error.value, error.allowed) from None
+        key = DISC[error.quantity].key if error.quantity in DISC else error.thing
+        raise error.named(f'{source}: {key}') from None
 
 
-_YAML_KEYS = {attribute: key for key, attribute in _PROPERTIES.items()} | {
-    attribute: f'damping.{key}' for key, attribute in _DAMPING.items()
-}
-
-
-def _section(section: str, values: object, fields: Mapping[str, str]) -> dict[str, Any]:
-    """Return the attributes of a disc that one section of its file gives."""
+def _section(section: str, values: object, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the fields of a disc from one section of its file."""
     if not isinstance(values, dict):
-        raise ConfigError(section, values, f'give the keys {", ".join(fields)}')
-    _refuse_unknown(values, fields, f'{section}.')
-    _require(values, fields, f'{section}.')
+        raise ConfigError(section, values, f'give the keys {", ".join(names)}')
+    _refuse_unknown(values, names, f'{section}.')
+    _require(values, names, f'{section}.')
+    if section in _NUMBERS:
+        quantities = _NUMBERS[section]
+        values = {
+            quantities[key].name: quantities[key].check(value, f'{section}.{key}')
+            for key, value in values.items()
+        }
+    if section == 'damping':
+        return values
     try:
-        if section in {'damping', 'linear'}:
-            values = {key: validation.number(key, value) for key, value in values.items()}
-        renamed = {fields[key]: value for key, value in values.items()}
-        if section == 'damping':
-            return renamed
-        return {section: _BUILDERS[section](**renamed)}
+        return {section: _BUILDERS[section](**values)}
     except ConfigError as error:
-        key = next((k for k, attribute in fields.items() if attribute == error.thing), error.thing)
-        raise ConfigError(f'{section}.{key}', error.value, error.allowed) from None
+        raise error.named(f'{section}.{error.thing}') from None
 
 
-def _refuse_unknown(
-    values: Mapping[Any, Any], allowed: Mapping[str, Any] | tuple[str, ...], prefix: str
-) -> None:
+def _refuse_unknown(values: Mapping[Any, Any], allowed: tuple[str, ...], prefix: str) -> None:
     for key in values:
         if key not in allowed:
             close = difflib.get_close_matches(str(key), allowed, n=1)
@@ -239,16 +230,16 @@ def _refuse_unknown(
             raise ConfigError(f'{prefix}{brief(key)}', 'an unknown key', message)
 
 
-def _require(values: Mapping[str, Any], needed: Mapping[str, str], prefix: str) -> None:
+def _require(values: Mapping[str, Any], needed: Iterable[str], prefix: str) -> None:
     for key in needed:
         if key not in values and key not in _OPTIONAL:
             raise ConfigError(f'{prefix}{key}', None, 'the key is missing')
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """A safe loader that refuses doubled and merged keys and has one kind of number, decimal.
+    """A safe loader that refuses repeated and merged keys, and reads only decimal numbers.
 
-    Merge keys of merge keys grow without bound, and `based_on` does what they are for.
+    Merge keys can grow without bound, and `based_on` serves their purpose.
     """
 
     def construct_mapping(
@@ -260,7 +251,7 @@ class _StrictLoader(yaml.SafeLoader):
         for key_node, _ in node.value:
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
             if key is None or key in seen or key == '<<':
-                problem = 'a doubled key' if key in seen else 'a key that is no word'
+                problem = 'the repeated key' if key in seen else 'a key that is not a word'
                 raise yaml.constructor.ConstructorError(
                     None, None, f'{problem} {key or ""}'.strip(), key_node.start_mark
                 )
@@ -269,9 +260,9 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 # PyYAML follows YAML 1.1, which reads 1e-3 as text, -045 as -37 and 1:30 as 90; YAML 1.2 does not.
-_NUMBERS = {'tag:yaml.org,2002:float', 'tag:yaml.org,2002:int'}
+_NUMBER_TAGS = {'tag:yaml.org,2002:float', 'tag:yaml.org,2002:int'}
 _StrictLoader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBER_TAGS]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _StrictLoader.add_implicit_resolver(

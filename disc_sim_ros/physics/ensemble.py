@@ -23,32 +23,8 @@ from disc_sim_ros.physics.kernels.jit import COMPILED, is_compiled
 from disc_sim_ros.physics.kernels.rk4 import STABLE
 from disc_sim_ros.physics.kernels.simd import WIDTH
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS
-from disc_sim_ros.physics.launch import LIMITS, Launch
-
-# What may differ from flight to flight besides the fields of Launch: least, greatest, unit.
-OTHER_LIMITS = {
-    'wind_x': (-100.0, 100.0, 'm/s'),  # where the air moves to, in `map`
-    'wind_y': (-100.0, 100.0, 'm/s'),
-    'wind_z': (-100.0, 100.0, 'm/s'),
-    'control_CL': (-10.0, 10.0, ''),  # held, the paper's signs
-    'control_CM': (-10.0, 10.0, ''),
-    'control_CN': (-10.0, 10.0, ''),
-    'mass': (1e-3, 100.0, 'kg'),
-    'inertia_axial': (1e-7, 100.0, 'kg m^2'),
-    'inertia_diametral': (1e-7, 100.0, 'kg m^2'),
-    'C_Lp': (-100.0, 0.0, ''),
-    'C_Mq': (-100.0, 0.0, ''),
-    'C_Nr': (-100.0, 0.0, ''),
-    'air_density': (0.0, 100.0, 'kg/m^3'),
-    'gravity': (0.0, 100.0, 'm/s^2'),
-    'lift_factor': (0.0, 10.0, ''),  # times the disc's own coefficients
-    'drag_factor': (0.0, 10.0, ''),
-    'pitching_factor': (0.0, 10.0, ''),
-    'lift_offset': (-2.0, 2.0, ''),  # added to them afterwards
-    'drag_offset': (-2.0, 2.0, ''),
-    'pitching_offset': (-2.0, 2.0, ''),
-}
-ALL_LIMITS = LIMITS | OTHER_LIMITS
+from disc_sim_ros.physics.launch import ABOVE_GROUND
+from disc_sim_ros.quantities import DURATION, LAUNCH, VARIED
 
 # Flights that a thread takes at a time: for 0.1 s or so, so that Ctrl-C is heard.
 _CHUNK = 2e6  # steps
@@ -114,7 +90,7 @@ def fly_many(
     *,
     control: Control = flight.NO_CONTROL,
     seeds: ArrayLike | None = None,
-    duration: float = 60.0,
+    duration: float = DURATION.default,
     ground: bool = True,
     threads: int | None = None,
 ) -> Landings:
@@ -139,7 +115,7 @@ def fly_many(
         ConfigError: A name is unknown, shapes differ, a value is out of range or a step too long
             for a flight; it names the first such flight.
     """
-    validation.number('duration', duration, above=0.0, highest=flight.LONGEST, unit='s')
+    DURATION.check(duration)
     control = flight.checked_control(control)
     columns = _checked_columns(launches, setup, control, ground=ground)
     n = max((x.size for x in columns.values() if x.ndim), default=1)
@@ -248,12 +224,10 @@ def _checked_columns(
         if x.ndim > 1 or (x.ndim == 1 and x.size != n):
             raise ConfigError(name, x.shape, f'give a number or an array of shape ({n},)')
     for name in launches:
-        lowest, highest, unit = ALL_LIMITS[name]
-        x = columns[name]
-        allowed = f'give a number from {lowest:g} to {highest:g} {unit}'.rstrip()
-        _refuse(name, x, (x >= lowest) & (x <= highest), allowed)
+        x, quantity = columns[name], VARIED[name]
+        _refuse(name, x, (x >= quantity.lowest) & (x <= quantity.highest), quantity.allowed)
     if ground:
-        _refuse('height', columns['height'], columns['height'] >= 0.0, 'release at 0 m or above')
+        _refuse('height', columns['height'], columns['height'] >= 0.0, ABOVE_GROUND)
     axial, most = columns['inertia_axial'], 2.0 * columns['inertia_diametral']
     axial = np.broadcast_to(axial, np.broadcast_shapes(axial.shape, most.shape))
     _refuse('inertia_axial', axial, axial <= most * (1 + 1e-9), 'at most twice inertia_diametral')
@@ -274,7 +248,7 @@ def _rows(columns: dict[str, FloatArray], start: int, stop: int) -> FloatArray:
 def _refuse(name: str, values: FloatArray, good: NDArray[np.bool_], allowed: str) -> None:
     if not good.all():
         i = int(np.argmin(good))
-        raise ConfigError(f'{name} of flight {i}', float(values.flat[i]), allowed)
+        raise ConfigError(f'{name} of flight {i}', float(values.flat[i]), allowed, name)
 
 
 def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
@@ -302,18 +276,17 @@ def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
             f'flight {start + i}, at spin {spin[i]:g} rad/s and {V[i]:g} m/s through the air, '
             f'needs at most {STABLE / fastest[i]:.3g} s'
         )
-        raise ConfigError('step', setup.step, allowed)
+        raise ConfigError('step', setup.step, allowed, 'step')
 
 
 def _defaults(setup: Setup, control: Control) -> dict[str, float]:
     """Return what each of NAMES is where it is not given."""
-    release = Launch()
     wind = (frames.map_from_paper(setup.wind.mean) + 0.0).tolist()
     plant = setup.plant
     other = [*wind, control.C_L, control.C_M, control.C_N]
     other += [plant.m, plant.I_z, plant.I_x, plant.C_Lp, plant.C_Mq, plant.C_Nr, plant.rho]
     other += [plant.g, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
-    values = [*(getattr(release, name) for name in LIMITS), *other]
+    values = [*(quantity.default for quantity in LAUNCH.values()), *other]
     return dict(zip(NAMES, values, strict=True))
 
 

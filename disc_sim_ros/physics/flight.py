@@ -28,13 +28,14 @@ from disc_sim_ros.physics.kernels.equations import (
 from disc_sim_ros.physics.kernels.jit import is_compiled
 from disc_sim_ros.physics.kernels.rk4 import STABLE
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, WindData
-from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.launch import Launch, require_above_ground
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
+from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT, DURATION, SAMPLE_RATE, STEP
 
 MODELS = {'exact': EXACT, 'constant_spin': CONSTANT_SPIN, 'precession': PRECESSION}
 MOMENT_AXES = {'body': BODY, 'wind': WIND}
 NO_CONTROL = Control()
-LONGEST = 3600.0  # s
+LONGEST = DURATION.highest
 MOST_SAMPLES = 5_000_000
 
 
@@ -61,12 +62,12 @@ class Setup:
     moment_axes: str = 'body'
     air: Air = field(default_factory=Air)
     wind: Wind = field(default_factory=Wind)
-    step: float = 1e-3
+    step: float = STEP.default
 
     def __post_init__(self) -> None:
         validation.choice('model', self.model, MODELS)
         validation.choice('moment_axes', self.moment_axes, MOMENT_AXES)
-        validation.number('step', self.step, 1e-6, 0.1, unit='s')
+        STEP.check(self.step)
         if self.aero is not None:
             validation.choice('aero', self.aero, AERODYNAMICS)
             if not self.disc.has(self.aero):
@@ -114,7 +115,7 @@ class Setup:
                 f'at spin {spin:g} rad/s and {V:g} m/s through the air RK4 needs at most '
                 f'{STABLE / fastest:.3g} s'
             )
-            raise ConfigError('step', self.step, allowed)
+            raise ConfigError(STEP.name, self.step, allowed, STEP.name)
 
     @cached_property
     def wind_data(self) -> WindData:
@@ -196,9 +197,9 @@ def fly(
     setup: Setup,
     *,
     control: Control = NO_CONTROL,
-    duration: float = 60.0,
+    duration: float = DURATION.default,
     ground: bool = True,
-    sample_rate: float = 0.0,
+    sample_rate: float = SAMPLE_RATE.default,
 ) -> Flight:
     """Fly a disc from its release to the ground.
 
@@ -255,14 +256,15 @@ def check_flight(
     Raises:
         ConfigError: As of `fly`.
     """
-    validation.number('duration', duration, above=0.0, highest=LONGEST, unit='s')
-    validation.number('sample_rate', sample_rate, 0.0, 1e5, unit='1/s')
+    DURATION.check(duration)
+    SAMPLE_RATE.check(sample_rate)
     setup.check_step(launch.spin, launch.speed)
-    if ground and launch.height < 0.0:
-        raise ConfigError('height', launch.height, 'with ground, release at 0 m or above')
+    if ground:
+        require_above_ground(launch.height)
     rows = math.floor(duration * sample_rate * (1 + 1e-12)) + 1 if sample_rate > 0.0 else 0
     if rows > MOST_SAMPLES:
-        raise ConfigError('sample_rate', sample_rate, f'at most {MOST_SAMPLES} samples a flight')
+        allowed = f'at most {MOST_SAMPLES} samples a flight'
+        raise ConfigError(SAMPLE_RATE.name, sample_rate, allowed, SAMPLE_RATE.name)
     return rows
 
 
@@ -289,20 +291,11 @@ def _line(disc: Disc) -> Linear:
 
 def checked_control(control: Control) -> Control:
     """Return the control inputs as finite floats of a sensible size."""
+    inputs = [q.check(getattr(control, name), f'control {name}') for name, q in _INPUTS.items()]
+    return Control._make([*inputs, int(control.axes)])
 
-    def within(name: str, limit: float, unit: str) -> float:
-        value = getattr(control, name)
-        return validation.number(f'control {name}', value, -limit, limit, unit=unit)
 
-    return Control(
-        C_L=within('C_L', 10.0, ''),
-        C_M=within('C_M', 10.0, ''),
-        C_N=within('C_N', 10.0, ''),
-        L=within('L', 1e3, 'N m'),
-        M=within('M', 1e3, 'N m'),
-        N=within('N', 1e3, 'N m'),
-        axes=int(control.axes),
-    )
+_INPUTS = dict(zip(Control._fields, (CONTROL | CONTROL_MOMENT).values(), strict=False))
 
 
 NO_NOISE = np.empty((0, NOISE_COLUMNS))

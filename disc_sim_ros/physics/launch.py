@@ -1,35 +1,40 @@
-"""How a disc is let go: the launch in a thrower's words, and the state that it means."""
+"""The release of a disc in a thrower's terms, and the state that it means."""
 
 from dataclasses import dataclass
 
-from disc_sim_ros import validation
+from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.kernels import rotation
 from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.quantities import LAUNCH
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Launch:
-    """A release. Angles are the paper's, in degrees; the defaults are the throw of its Fig. 5.
+    """A release; the defaults are the throw of the paper's Fig. 5.
 
-    The velocity lies in the disc's x-z plane, `angle_of_attack` below its x axis, turned right by
-    `sideslip`; it is over the ground, so that wind comes on top. Rates are body rates at release.
+    The velocity is over the ground, so that wind comes on top. It points `angle_of_attack` below
+    the plane of the disc and `sideslip` right of its x axis. Rates are body rates at release.
+    Ranges and defaults are in `quantities.LAUNCH`.
+
+    Raises:
+        ConfigError: A value is out of range.
     """
 
-    speed: float = 15.0  # m/s
-    pitch: float = 15.0  # degrees, nose up positive
-    roll: float = 0.0  # degrees, right edge down positive
-    yaw: float = 0.0  # degrees, right of +x positive
-    angle_of_attack: float = 0.0  # degrees
-    sideslip: float = 0.0  # degrees
-    spin: float = 31.416  # rad/s, clockwise from above positive
-    roll_rate: float = 0.0  # rad/s, p
-    pitch_rate: float = 0.0  # rad/s, q
-    height: float = 0.0  # m above the ground
+    speed: float = LAUNCH['speed'].default  # m/s
+    pitch: float = LAUNCH['pitch'].default  # degrees, nose up positive
+    roll: float = LAUNCH['roll'].default  # degrees, right edge down positive
+    yaw: float = LAUNCH['yaw'].default  # degrees, right of +x positive
+    angle_of_attack: float = LAUNCH['angle_of_attack'].default  # degrees
+    sideslip: float = LAUNCH['sideslip'].default  # degrees
+    spin: float = LAUNCH['spin'].default  # rad/s, clockwise from above positive
+    roll_rate: float = LAUNCH['roll_rate'].default  # rad/s, p
+    pitch_rate: float = LAUNCH['pitch_rate'].default  # rad/s, q
+    height: float = LAUNCH['height'].default  # m above the ground
 
     def __post_init__(self) -> None:
-        for name, (lowest, highest, unit) in LIMITS.items():
-            validation.number(name, getattr(self, name), lowest, highest, unit=unit)
+        for name, quantity in LAUNCH.items():
+            quantity.check(getattr(self, name))
 
     def state(self) -> State:
         """Return the state at release in despun axes, spin angle 0."""
@@ -57,15 +62,17 @@ class Launch:
         )
 
 
-LIMITS = {
-    'speed': (0.0, 200.0, 'm/s'),
-    'pitch': (-180.0, 180.0, 'degrees'),
-    'roll': (-180.0, 180.0, 'degrees'),
-    'yaw': (-360.0, 360.0, 'degrees'),
-    'angle_of_attack': (-180.0, 180.0, 'degrees'),
-    'sideslip': (-180.0, 180.0, 'degrees'),
-    'spin': (-1000.0, 1000.0, 'rad/s'),
-    'roll_rate': (-1000.0, 1000.0, 'rad/s'),
-    'pitch_rate': (-1000.0, 1000.0, 'rad/s'),
-    'height': (-1000.0, 10000.0, 'm'),
-}
+ABOVE_GROUND = 'with ground, release at 0 m or above'
+
+
+def require_above_ground(height: float) -> None:
+    """Refuse a release below the ground, for flights that end there.
+
+    Args:
+        height: Height of the centre of the disc [m].
+
+    Raises:
+        ConfigError: The height is negative.
+    """
+    if height < 0.0:
+        raise ConfigError('height', height, ABOVE_GROUND, 'height')

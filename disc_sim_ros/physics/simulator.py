@@ -15,7 +15,7 @@ from disc_sim_ros.physics.kernels.equations import Control, State, Velocity
 from disc_sim_ros.physics.kernels.integrator import LANDED, LOST, PROGRESS_SIZE, STATE_SIZE
 from disc_sim_ros.physics.kernels.jit import is_compiled
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, wind_at
-from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.launch import Launch, require_above_ground
 
 _GUST = slice(1 + STATE_SIZE, 4 + STATE_SIZE)  # in a Progress
 NOTHING = integrator.Observed(*(0.0,) * 12)  # acts on a disc that is held or lies
@@ -44,10 +44,8 @@ class FlightSimulator:
             ConfigError: A release underground, or a step too long for the spin.
         """
         setup.check_step(release.r, math.hypot(release.VX, release.VY, release.VZ))
-        if ground and release.Z > 0.0:
-            raise ConfigError(
-                'height', frames.flip(release.Z), 'with ground, release at 0 m or above'
-            )
+        if ground:
+            require_above_ground(frames.flip(release.Z))
         self.setup = setup
         self.ground = ground
         self.release = release
@@ -118,7 +116,8 @@ class FlightSimulator:
             ConfigError: Turbulence would start or end in mid-flight.
         """
         if (wind.turbulence > 0.0) != (self.setup.wind.turbulence > 0.0) and self.steps > 0:
-            raise ConfigError('turbulence', wind.turbulence, 'it starts or ends at a release')
+            allowed = 'it starts or ends at a release'
+            raise ConfigError('turbulence', wind.turbulence, allowed, 'turbulence')
         seed = self.setup.wind.seed
         self.setup = replace(self.setup, wind=replace(wind, seed=seed))
 

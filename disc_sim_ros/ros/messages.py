@@ -11,7 +11,7 @@ docs/axes.md explains both kinds of axes.
 import math
 from typing import Any
 
-from disc_sim_ros import topics, validation
+from disc_sim_ros import topics
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames as paper_frames
@@ -20,7 +20,17 @@ from disc_sim_ros.physics import trajectory
 from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.kernels.rotation import Quaternion
+from disc_sim_ros.quantities import (
+    CONTROL,
+    CONTROL_MOMENT,
+    LAUNCH,
+    MEAN_WIND,
+    ORIENTATION,
+    POSITION,
+    VELOCITY,
+)
 from disc_sim_ros.topics import Frames
+from disc_sim_ros.validation import Quantity
 
 _VECTOR = ('x', 'y', 'z')
 _QUATERNION = ('x', 'y', 'z', 'w')
@@ -43,12 +53,14 @@ TORQUE_FIELDS = _paths('wrench.torque', _VECTOR)
 WRENCH_FIELDS = _paths('wrench.force', _VECTOR) + TORQUE_FIELDS
 VECTOR_FIELDS = _paths('vector', _VECTOR)
 
-LARGEST_MOMENT = 1e3  # N m
-LARGEST_COEFFICIENT = 10.0
-LARGEST_WIND = 100.0  # m/s, each component
-LARGEST_POSITION = 1e4  # m, each component
-LARGEST_SPEED = 200.0  # m/s
-LARGEST_RATE = 1e3  # rad/s, each component
+# Quantities of x, y, z.
+_MOMENT = tuple(CONTROL_MOMENT.values())
+_COEFFICIENTS = tuple(CONTROL.values())
+_WIND = tuple(MEAN_WIND.values())
+_POSITION = (POSITION, POSITION, POSITION)
+_SPEED = LAUNCH['speed']
+_VELOCITY = (VELOCITY, VELOCITY, VELOCITY)
+_RATES = (LAUNCH['roll_rate'], LAUNCH['pitch_rate'], LAUNCH['spin'])
 _UNIT_NORM = 1e-3  # a quaternion this near to unit length is meant to have it
 _NANOSECONDS = 1_000_000_000
 
@@ -87,9 +99,7 @@ def moment_from_wrench(message: Any, frames: Frames) -> tuple[float, float, floa
         if force != 0.0:
             thing = f'{topics.CMD_MOMENT} wrench.force.{name}'
             raise ConfigError(thing, force, 'must be 0: a disc takes torques, not forces')
-    torque = _vector(
-        f'{topics.CMD_MOMENT} wrench.torque', message.wrench.torque, LARGEST_MOMENT, 'N m'
-    )
+    torque = _vector(f'{topics.CMD_MOMENT} wrench.torque', message.wrench.torque, _MOMENT)
     return *flip_yz(torque), allowed[frame]
 
 
@@ -105,7 +115,7 @@ def coefficients_from_vector(message: Any, frames: Frames) -> Vector:
         ConfigError: A coefficient out of range, another frame.
     """
     _frame(topics.CMD_COEFFICIENTS, message, (frames.disc_air,), frames.disc_air)
-    return _vector(f'{topics.CMD_COEFFICIENTS} vector', message.vector, LARGEST_COEFFICIENT)
+    return _vector(f'{topics.CMD_COEFFICIENTS} vector', message.vector, _COEFFICIENTS)
 
 
 def wind_from_vector(message: Any, frames: Frames) -> Vector:
@@ -119,7 +129,7 @@ def wind_from_vector(message: Any, frames: Frames) -> Vector:
         ConfigError: A wind out of range, another frame.
     """
     _frame(topics.WIND, message, (frames.map,), frames.map)
-    return flip_yz(_vector(f'{topics.WIND} vector', message.vector, LARGEST_WIND, 'm/s'))
+    return flip_yz(_vector(f'{topics.WIND} vector', message.vector, _WIND))
 
 
 def release_from_odometry(message: Any, frames: Frames) -> State:
@@ -144,13 +154,13 @@ def release_from_odometry(message: Any, frames: Frames) -> State:
         )
 
     at, twist = message.pose.pose, message.twist.twist
-    X, Y, Z = flip_yz(_vector(f'{topic} pose.pose.position', at.position, LARGEST_POSITION, 'm'))
+    X, Y, Z = flip_yz(_vector(f'{topic} pose.pose.position', at.position, _POSITION))
     e = _attitude(f'{topic} pose.pose.orientation', at.orientation)
-    linear = _vector(f'{topic} twist.twist.linear', twist.linear, LARGEST_SPEED, 'm/s')
-    if math.hypot(*linear) > LARGEST_SPEED:
-        allowed = f'give a speed of at most {LARGEST_SPEED:g} m/s'
+    linear = _vector(f'{topic} twist.twist.linear', twist.linear, _VELOCITY)
+    if math.hypot(*linear) > _SPEED.highest:
+        allowed = f'give a speed of at most {_SPEED.highest:g} {_SPEED.unit}'
         raise ConfigError(f'{topic} twist.twist.linear', linear, allowed)
-    angular = _vector(f'{topic} twist.twist.angular', twist.angular, LARGEST_RATE, 'rad/s')
+    angular = _vector(f'{topic} twist.twist.angular', twist.angular, _RATES)
     if angular[2] == 0.0:
         raise ConfigError(f'{topic} twist.twist.angular.z', 0.0, 'a throw needs spin')
     VX, VY, VZ = paper_frames.earth_from_body(e, flip_yz(linear))
@@ -161,8 +171,7 @@ def release_from_odometry(message: Any, frames: Frames) -> State:
 def _attitude(thing: str, orientation: Any) -> Quaternion:
     """Return the unit quaternion of despun axes 2 in axes 1, scalar first."""
     xyzw = [
-        validation.number(f'{thing}.{name}', getattr(orientation, name), -2.0, 2.0)
-        for name in _QUATERNION
+        ORIENTATION.check(getattr(orientation, name), f'{thing}.{name}') for name in _QUATERNION
     ]
     norm = math.hypot(*xyzw)
     if abs(norm - 1.0) > _UNIT_NORM:
@@ -172,11 +181,11 @@ def _attitude(thing: str, orientation: Any) -> Quaternion:
     return e0, e1, e2, e3
 
 
-def _vector(thing: str, vector: Any, limit: float, unit: str = '') -> Vector:
-    """Return x, y, z of a message as finite floats no larger than a limit."""
+def _vector(thing: str, vector: Any, quantities: tuple[Quantity, ...]) -> Vector:
+    """Return x, y, z of a message as finite floats in the ranges of three quantities."""
     x, y, z = (
-        validation.number(f'{thing}.{name}', getattr(vector, name), -limit, limit, unit=unit)
-        for name in _VECTOR
+        quantity.check(getattr(vector, name), f'{thing}.{name}')
+        for name, quantity in zip(_VECTOR, quantities, strict=True)
     )
     return x, y, z
 

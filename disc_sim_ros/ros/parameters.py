@@ -1,4 +1,4 @@
-"""The parameters of a table in ROS: declared, described, refused."""
+"""Parameters of a ROS node from a table of specifications: declaration, description, refusal."""
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
@@ -27,41 +27,41 @@ _TYPES = {
     tuple: Parameter.Type.DOUBLE_ARRAY,
 }
 _WHEN = {
-    'next throw': 'A change counts from the next throw on.',
-    'at once': 'A change counts at once.',
+    'next throw': 'A change takes effect at the next throw.',
+    'at once': 'A change takes effect at once.',
     'fixed': 'Fixed when the node starts.',
 }
 
 
 def declare(node: Node, table: Sequence[ParameterSpec]) -> None:
-    """Declare the parameters of a table, with the values that came from files and command line.
+    """Declare the parameters of a table, with the values from files and the command line.
 
-    A parameter has one type for good, so that `ros2 param describe` tells type and range, and an
-    integer for a double, which rclpy would refuse, is turned into one before it gets there. Call
-    this before adding a callback that uses `refusal`.
+    The type of a parameter is fixed, so that `ros2 param describe` shows type and range. rclpy
+    would refuse an integer for a double; it is converted first. Call this function before adding
+    a callback that uses `refusal`.
 
     Raises:
-        ConfigError: A value for a parameter that does not exist, of a wrong type or out of range;
-            nothing is declared then.
+        ConfigError: A value is given for an unknown parameter, has the wrong type or is out of
+            range; no parameter is declared then.
     """
     given = {
         name: value
         for name, value in _overrides(node).items()
         if name not in _OF_ROS and not name.startswith(_QOS)
     }
-    first = checked(given, table)
-    for entry in table:
-        value = plain(first[entry.name])
-        node.declare_parameter(entry.name, value, descriptor(entry), ignore_override=True)
+    initial = checked(given, table)
+    for spec in table:
+        value = plain(initial[spec.name])
+        node.declare_parameter(spec.name, value, descriptor(spec), ignore_override=True)
 
 
 def refuse_unused(node: Node) -> None:
-    """Refuse values for parameters that nobody declared, such as a misspelt `qos_overrides`.
+    """Refuse values for parameters that are not declared, such as a misspelt `qos_overrides`.
 
-    Call this when all publishers and subscriptions exist: they declare those.
+    Publishers and subscriptions declare `qos_overrides`: call this function after making them.
 
     Raises:
-        ConfigError: There is such a value.
+        ConfigError: A value is given for a parameter that is not declared.
     """
     declared = node.list_parameters([], depth=0).names
     for name, value in _overrides(node).items():
@@ -70,9 +70,9 @@ def refuse_unused(node: Node) -> None:
 
 
 def values(node: Node, table: Sequence[ParameterSpec]) -> dict[str, object]:
-    """Return the present value of every parameter of a table, arrays as tuples."""
-    present = {entry.name: node.get_parameter(entry.name).value for entry in table}
-    return {n: tuple(x) if isinstance(x, list | array) else x for n, x in present.items()}
+    """Return the current value of every parameter of a table, arrays as tuples."""
+    current = {spec.name: node.get_parameter(spec.name).value for spec in table}
+    return {n: tuple(x) if isinstance(x, list | array) else x for n, x in current.items()}
 
 
 def refusal(
@@ -81,32 +81,32 @@ def refusal(
     table: Sequence[ParameterSpec],
     judge: Callable[[Mapping[str, object]], object],
 ) -> str:
-    """Return why a set of changes is impossible, as a whole; empty if it is possible.
+    """Return why a set of changes is refused as a whole; empty if it is allowed.
 
-    Parameters of ROS itself, such as use_sim_time, are not looked at.
+    Parameters of ROS itself, such as use_sim_time, are ignored.
 
     Args:
-        node: Who declared the table.
-        changes: What is asked for.
-        table: Its parameters.
-        judge: Raises ConfigError where the values of all do not go together.
+        node: The node that declared the table.
+        changes: The requested changes.
+        table: The parameters of the node.
+        judge: Raises ConfigError where the values of all parameters contradict each other.
     """
-    now = values(node, table)
-    new = {change.name: change.value for change in changes if change.name in now}
+    current = values(node, table)
+    new = {change.name: change.value for change in changes if change.name in current}
     try:
-        judge({**now, **new})
+        judge({**current, **new})
     except ConfigError as error:
         return str(error)
     return ''
 
 
 def widened(changes: Sequence[Parameter], table: Sequence[ParameterSpec]) -> list[Parameter]:
-    """Return changes with integers made doubles where doubles are due.
+    """Return changes with integers converted to doubles where the parameter is a double.
 
     For `add_pre_set_parameters_callback`: `ros2 param set /sim_node launch.speed 20` sends an
     integer, and rclpy would refuse it.
     """
-    defaults = {entry.name: entry.default for entry in table}
+    defaults = {spec.name: spec.default for spec in table}
     return [_wide(change, defaults.get(change.name)) for change in changes]
 
 
@@ -122,40 +122,40 @@ def _wide(change: Parameter, default: Value | None) -> Parameter:
 
 
 def _overrides(node: Node) -> dict[str, object]:
-    """Return what files, command line and constructor gave; rclpy has no public way to ask."""
+    """Return the values from files, command line and constructor; rclpy keeps them private."""
     return {p.name: p.value for p in node._parameter_overrides.values()}  # noqa: SLF001
 
 
-def descriptor(entry: ParameterSpec) -> ParameterDescriptor:
-    """Return a parameter as `ros2 param describe` shows it."""
+def descriptor(spec: ParameterSpec) -> ParameterDescriptor:
+    """Return the description that `ros2 param describe` shows."""
     described = ParameterDescriptor(
-        name=entry.name,
-        type=_TYPES[type(entry.default)].value,
-        description=_description(entry),
-        additional_constraints=_constraints(entry),
-        read_only=entry.effect == 'fixed',
+        name=spec.name,
+        type=_TYPES[type(spec.default)].value,
+        description=_description(spec),
+        additional_constraints=_constraints(spec),
+        read_only=spec.effect == 'fixed',
     )
-    match entry.default:
+    match spec.default:
         case bool():
             pass
         case int():
             described.integer_range = [
-                IntegerRange(from_value=int(entry.lowest), to_value=int(entry.highest), step=1)
+                IntegerRange(from_value=int(spec.lowest), to_value=int(spec.highest), step=1)
             ]
         case float():
             described.floating_point_range = [
-                FloatingPointRange(from_value=entry.lowest, to_value=entry.highest)
+                FloatingPointRange(from_value=spec.lowest, to_value=spec.highest)
             ]
     return described
 
 
-def _description(entry: ParameterSpec) -> str:
-    unit = f' Unit: {entry.unit}.' if entry.unit else ''
-    return f'{entry.meaning}{unit} {_WHEN[entry.effect]}'
+def _description(spec: ParameterSpec) -> str:
+    unit = f' Unit: {spec.unit}.' if spec.unit else ''
+    return f'{spec.meaning}{unit} {_WHEN[spec.effect]}'
 
 
-def _constraints(entry: ParameterSpec) -> str:
-    """Return what a range cannot say."""
-    ranged = isinstance(entry.default, int | float)
-    parts = [] if ranged else [allowed_text(entry)]
-    return '; '.join(part for part in (*parts, entry.constraint) if part)
+def _constraints(spec: ParameterSpec) -> str:
+    """Return the conditions that a range of a descriptor cannot express."""
+    ranged = isinstance(spec.default, int | float)
+    parts = [] if ranged else [allowed_text(spec)]
+    return '; '.join(part for part in (*parts, spec.constraint) if part)

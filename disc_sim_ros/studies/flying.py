@@ -51,7 +51,7 @@ def fly_batch(question: Study, start: int, stop: int, threads: int | None) -> Co
         threads=threads,
     )
     columns: Columns = {'index': np.arange(start, stop)}
-    columns |= {q.column: values[q.name] for q in question.varied}
+    columns |= {q.key: values[q.name] for q in question.varied}
     if seeds is not None:
         columns['gust_seed'] = seeds
     return columns | {

@@ -10,7 +10,7 @@ import numpy as np
 from disc_sim_ros.physics import theory
 from disc_sim_ros.physics.flight import Flight, Setup, fly
 from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.studies.columns import CONTROL, LAUNCH, SHORT, WIND, quantity
+from disc_sim_ros.studies.columns import CONTROL, LAUNCH, WIND, quantity
 from disc_sim_ros.studies.optimise import ACCURACY, Optimum, slack
 from disc_sim_ros.studies.study import Study, study_document
 
@@ -62,7 +62,7 @@ def text(optimum: Optimum, command: str) -> str:
     ]
     if problem.scatters:
         spread = ', '.join(
-            f'{name} ± {law.sd:g} {SHORT.get(quantity("", name).unit, quantity("", name).unit)}'
+            f'{name} ± {law.sd:g} {quantity("", name).short_unit}'
             for name, law in problem.question.scatter.items()
             if hasattr(law, 'sd')
         )
@@ -90,8 +90,8 @@ def optimum_document(optimum: Optimum, command: str) -> dict[str, Any]:
         'for': problem.goal,
         'target_m': problem.target,
         'percentile': problem.percentile,
-        'limits': {quantity('', n).column: list(span) for n, span in problem.limits.items()},
-        'launch': {quantity('', n).column: value for n, value in optimum.launch.items()},
+        'limits': {quantity('', n).key: list(span) for n, span in problem.limits.items()},
+        'launch': {quantity('', n).key: value for n, value in optimum.launch.items()},
         'value': optimum.value,
         'flight': {
             'range_m': flight.range,
@@ -102,7 +102,7 @@ def optimum_document(optimum: Optimum, command: str) -> dict[str, Any]:
         'throws': len(r),
         'mean': float(r.mean()),
         'sd': float(r.std(ddof=1)) if len(r) > 1 else 0.0,
-        'flat': {quantity('', n).column: list(span) for n, span in optimum.flat.items()},
+        'flat': {quantity('', n).key: list(span) for n, span in optimum.flat.items()},
         'flat_slack': optimum.slack,
         'at_limit': list(optimum.at_limit),
         'launches_tried': optimum.launches,
@@ -165,6 +165,4 @@ def statistic_of(optimum: Optimum) -> str:
 def told(name: str, value: float) -> str:
     """Return a value with its name and unit."""
     q = quantity('', name)
-    return f'{name.replace("_", " ")} {value:.6g} {SHORT.get(q.unit, q.unit)}'.strip().replace(
-        ' °', '°'
-    )
+    return f'{name.replace("_", " ")} {value:.6g} {q.short_unit}'.strip().replace(' °', '°')

@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.studies.columns import SHORT, WIND, quantity
+from disc_sim_ros.studies.columns import WIND, quantity
 from disc_sim_ros.studies.scatter import Normal
 from disc_sim_ros.studies.study import Study, study_document
 from disc_sim_ros.studies.summary import ANSWERS, ELLIPSES, Ellipse, Summary
@@ -96,7 +96,7 @@ def summary_document(summary: Summary) -> dict[str, Any]:
 
 def columns_of(values: dict[str, float]) -> dict[str, float]:
     """Return values by quantity under the names of their columns, with units."""
-    return {quantity('name', name).column: value for name, value in values.items()}
+    return {quantity('name', name).key: value for name, value in values.items()}
 
 
 def _spread_lines(summary: Summary) -> list[str]:
@@ -180,7 +180,7 @@ def _value(name: str, value: float) -> str:
 
 def _told(name: str, values: str) -> str:
     q = quantity('name', name)
-    unit = SHORT.get(q.unit, q.unit)
+    unit = q.short_unit
     return f'{q.name.replace("_", " ")} {values} {unit}'.rstrip().replace(' °', '°')
 
 

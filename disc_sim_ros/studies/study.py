@@ -15,18 +15,19 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError, brief
 from disc_sim_ros.physics import disc_file, flight, frames, theory
 from disc_sim_ros.physics.kernels.equations import Control
-from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.quantities import DURATION, LARGEST_SEED
 from disc_sim_ros.studies import sampling
 from disc_sim_ros.studies.columns import (
     ADVANCE_RATIO,
     CONTROL,
     LAUNCH,
     WIND,
-    Quantity,
     fixed_property,
     quantity,
 )
 from disc_sim_ros.studies.scatter import Normal, Uniform, correlation_factor, quantiles
+from disc_sim_ros.validation import Quantity
 
 EACH, SAME = 'each', 'same'
 GUSTS = (EACH, SAME)
@@ -45,7 +46,7 @@ class Study:
         launch: The release where nothing else is said.
         control: Control inputs where nothing else is said; coefficients only.
         advance_ratio: Spin as r c / (2 V) of each flight instead of `launch.spin`, or None.
-        vary: Values of each quantity of the grid; names as in `quantities.QUANTITIES`.
+        vary: Values of each quantity of the grid; names as in `quantities.VARIED`.
         scatter: How each scattered quantity is drawn. A quantity may be in both: `Normal` without
             a mean scatters around the grid.
         correlations: Of pairs of scattered quantities, between -1 and 1; of their normal
@@ -73,12 +74,12 @@ class Study:
     seed: int = 0
     sampling: str = sampling.RANDOM
     gusts: str = EACH
-    duration: float = 60.0
+    duration: float = DURATION.default
     ground: bool = True
 
     def __post_init__(self) -> None:
         validation.whole_number('count', self.count, 1, sampling.MOST_SAMPLES)
-        validation.whole_number('seed', self.seed, 0, 2**63 - 1)
+        validation.whole_number('seed', self.seed, 0, LARGEST_SEED)
         validation.choice('sampling', self.sampling, sampling.METHODS)
         validation.choice('gusts', self.gusts, GUSTS)
         self._check_names()
@@ -207,7 +208,7 @@ class Study:
         if self.count > 1 and not self.scatter and not self.gusts_differ:
             allowed = 'nothing differs from sample to sample; give scatter, or gusts that do'
             raise ConfigError('count', self.count, allowed)
-        if self.gusts_differ and self.setup.wind.seed + self.count >= 2**63:
+        if self.gusts_differ and self.setup.wind.seed + self.count > LARGEST_SEED:
             raise ConfigError('seed', self.setup.wind.seed, 'each sample needs a seed above it')
 
     @cached_property
@@ -225,7 +226,7 @@ class Study:
         """Refuse values out of range, and a step that is too long for the fastest flight."""
         for q in self.varied:
             self._ends(q)
-        spin = validation.number('spin', self.fastest_spin, 0.0, LIMITS['spin'][1], unit='rad/s')
+        spin = quantity('name', 'spin').within(0.0).check(self.fastest_spin)
         height = min(self._ends(quantity('name', 'height')))
         flight.check_flight(
             replace(self.launch, spin=spin, speed=self._largest('speed'), height=height),
@@ -246,7 +247,8 @@ class Study:
         law = self.scatter.get(q.name)
         if isinstance(law, Uniform):
             ends = (law.low, law.high)
-            values += [validation.number(q.name, x, lowest, highest, unit=q.unit) for x in ends]
+            thing = f'uniform {q.name}'
+            values += [validation.number(thing, x, lowest, highest, unit=q.unit) for x in ends]
         elif law is not None:
             centres = values or [self.fixed(q.name) if law.mean is None else law.mean]
             values = []

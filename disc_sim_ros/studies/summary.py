@@ -141,7 +141,7 @@ class _FirstPass:
     def __init__(self, chunks: Chunks, question: Study) -> None:
         scattered = [] if question.vary else list(question.scatter)
         self.inputs = [q for q in question.varied if q.name in scattered]
-        columns = [q.column for q in self.inputs] + list(SPREADS)
+        columns = [q.key for q in self.inputs] + list(SPREADS)
         self.counts = np.zeros(len(STATUS), dtype=np.int64)
         self.moments = Moments(len(columns))
         gridded = question.vary and question.points <= MOST_POINTS

@@ -17,7 +17,7 @@ import pytest
 
 from disc_sim_ros.cli import fly, optimise, sweep
 from disc_sim_ros.cli.progress import duration, progress_text
-from disc_sim_ros.studies.columns import QUANTITIES
+from disc_sim_ros.quantities import VARIED
 
 BIN = Path(sys.executable).parent
 
@@ -45,7 +45,7 @@ def test_help_has_every_quantity_with_its_unit(capsys):
         assert ended.value.code == 0
         text = ' '.join(capsys.readouterr().out.split())
         assert text.startswith('usage')
-        told = [f'{q.name} ({q.unit})' if q.unit else q.name for q in QUANTITIES.values()]
+        told = [f'{q.name} ({q.unit})' if q.unit else q.name for q in VARIED.values()]
         assert [word for word in told if word not in text] == []
 
 

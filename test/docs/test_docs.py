@@ -27,8 +27,9 @@ from disc_sim_ros.cli.fly import parser
 from disc_sim_ros.physics import disc, disc_file, environment, frames, theory
 from disc_sim_ros.physics.flight import Flight, Setup, fly
 from disc_sim_ros.physics.kernels import aerodynamics, equations
-from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.quantities import LAUNCH
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
@@ -263,7 +264,7 @@ def test_units_of_a_launch_are_its_own():
         for name in names_in(row[CODE])
         if name.startswith('launch.Launch.')
     }
-    assert units == {name: unit for name, (_, _, unit) in LIMITS.items()}
+    assert units == {q.name: q.unit for q in LAUNCH.values()}
 
 
 # ---- links ----

@@ -10,7 +10,8 @@ import pytest
 pytest.importorskip('rclpy')
 
 from disc_sim_ros import topics
-from disc_sim_ros.ros import messages, qos
+from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT, LAUNCH, MEAN_WIND, POSITION
+from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim import publishers
 from disc_sim_ros.topics import Frames
 
@@ -117,12 +118,14 @@ def test_every_frame_is_there_and_no_other():
 
 def test_limits_are_those_of_the_code():
     taken = {row[0].strip('`'): row[2] for row in rows('Taken')}
-    assert f'up to {messages.LARGEST_MOMENT:g} N m' in taken[topics.CMD_MOMENT]
-    assert f'up to {messages.LARGEST_COEFFICIENT:g}' in taken[topics.CMD_COEFFICIENTS]
-    assert f'up to {messages.LARGEST_WIND:g} m/s' in taken[topics.WIND]
-    assert f'up to {messages.LARGEST_POSITION / 1000:g} km' in taken[topics.THROW]
-    assert f'up to {messages.LARGEST_SPEED:g} m/s' in taken[topics.THROW]
-    assert f'up to {messages.LARGEST_RATE:g} rad/s' in taken[topics.THROW]
+    moment, coefficient = CONTROL_MOMENT['control_M'], CONTROL['control_CM']
+    wind, speed, rate = MEAN_WIND['wind_x'], LAUNCH['speed'], LAUNCH['spin']
+    assert f'up to {moment.highest:g} {moment.unit}' in taken[topics.CMD_MOMENT]
+    assert f'up to {coefficient.highest:g}' in taken[topics.CMD_COEFFICIENTS]
+    assert f'up to {wind.highest:g} {wind.unit}' in taken[topics.WIND]
+    assert f'up to {POSITION.highest / 1000:g} km' in taken[topics.THROW]
+    assert f'up to {speed.highest:g} {speed.unit}' in taken[topics.THROW]
+    assert f'up to {rate.highest:g} {rate.unit}' in taken[topics.THROW]
 
 
 def test_numbers_of_the_text_are_those_of_the_code():

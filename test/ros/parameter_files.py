@@ -5,12 +5,12 @@ from pathlib import Path
 from disc_sim_ros.ros.sim.parameters import TABLE
 
 ROOT = Path(__file__).parents[2]
-DEFAULTS = {entry.name: entry.default for entry in TABLE}
-ENTRIES = {entry.name: entry for entry in TABLE}
+DEFAULTS = {spec.name: spec.default for spec in TABLE}
+SPECS = {spec.name: spec for spec in TABLE}
 NUMBERS = [
-    entry
-    for entry in TABLE
-    if isinstance(entry.default, int | float) and not isinstance(entry.default, bool)
+    spec
+    for spec in TABLE
+    if isinstance(spec.default, int | float) and not isinstance(spec.default, bool)
 ]
 # With these, any one number may be at the end of its range.
 LENIENT = {

@@ -14,14 +14,14 @@ pytest.importorskip('rclpy')
 
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.environment import Air, Wind
-from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.quantities import QUANTITIES
 from disc_sim_ros.ros.parameter_spec import ParameterSpec
 from disc_sim_ros.ros.sim.config import configuration
 from disc_sim_ros.ros.sim.parameters import TABLE
 from ros.parameter_files import (
     DEFAULTS,
     DISC_FILE,
-    ENTRIES,
     LENIENT,
     NUMBERS,
     ROOT,
@@ -36,23 +36,30 @@ def test_names_are_unique():
     assert len(DEFAULTS) == len(TABLE)
 
 
-@pytest.mark.parametrize('entry', TABLE, ids=lambda entry: entry.name)
-def test_every_parameter_says_what_it_is(entry):
-    assert entry.meaning.endswith('.')
-    assert entry.effect in {'next throw', 'at once', 'fixed'}
-    number = isinstance(entry.default, int | float | tuple) and not isinstance(entry.default, bool)
-    assert number == math.isfinite(entry.lowest) == math.isfinite(entry.highest)
+@pytest.mark.parametrize('spec', TABLE, ids=lambda spec: spec.name)
+def test_every_parameter_has_a_meaning_an_effect_and_a_range(spec):
+    assert spec.meaning.endswith('.')
+    assert spec.effect in {'next throw', 'at once', 'fixed'}
+    number = isinstance(spec.default, int | float | tuple) and not isinstance(spec.default, bool)
+    assert number == math.isfinite(spec.lowest) == math.isfinite(spec.highest)
 
 
-def test_defaults_and_limits_of_the_launch_are_those_of_the_core():
-    launch = {name: ENTRIES[f'launch.{name}'] for name in LIMITS}
-    assert {name: entry.default for name, entry in launch.items()} == dataclasses.asdict(Launch())
-    assert {name: (e.lowest, e.highest, e.unit) for name, e in launch.items()} == LIMITS
+def test_the_parameters_of_the_launch_are_its_fields_with_their_defaults():
+    prefix = 'launch.'
+    launch = {n.removeprefix(prefix): x for n, x in DEFAULTS.items() if n.startswith(prefix)}
+    assert launch == dataclasses.asdict(Launch())
+
+
+def test_every_number_is_a_quantity_of_the_table():
+    for spec in TABLE:
+        number = isinstance(spec.default, int | float | tuple)
+        assert (spec.quantity is not None) == (number and not isinstance(spec.default, bool))
+    assert {spec.quantity for spec in TABLE if spec.quantity} <= set(QUANTITIES.values())
 
 
 def test_the_effects_are_those_that_the_node_can_keep():
     by_effect = {
-        effect: {entry.name for entry in TABLE if entry.effect == effect}
+        effect: {spec.name for spec in TABLE if spec.effect == effect}
         for effect in ('at once', 'fixed')
     }
     assert by_effect == {
@@ -112,19 +119,19 @@ def test_every_parameter_reaches_the_configuration():
     """A changed value must change the configuration: none may be forgotten on the way."""
     words = {'disc': 'ultrastar', 'model': 'precession', 'moment_axes': 'wind', 'aero': 'linear'}
     words |= {'frame_prefix': 'red/', 'publish_rate': 100.0, 'physics_rate': 2000.0}
-    for entry in TABLE:
-        value = words.get(entry.name)
+    for spec in TABLE:
+        value = words.get(spec.name)
         if value is None:
-            value = changed(entry)
-        assert configuration({entry.name: value}) != configuration({}), entry.name
+            value = changed(spec)
+        assert configuration({spec.name: value}) != configuration({}), spec.name
 
 
-def changed(entry: ParameterSpec) -> object:
-    if isinstance(entry.default, bool):
-        return not entry.default
-    if isinstance(entry.default, tuple):
+def changed(spec: ParameterSpec) -> object:
+    if isinstance(spec.default, bool):
+        return not spec.default
+    if isinstance(spec.default, tuple):
         return [1.0, 2.0, 3.0]
-    return entry.default + 1
+    return spec.default + 1
 
 
 def test_wind_turns_from_map_to_the_axes_of_the_paper():
@@ -144,33 +151,33 @@ def test_a_whole_number_is_a_double_where_one_is_due():
 
 
 @pytest.mark.parametrize('end', ['lowest', 'highest'])
-@pytest.mark.parametrize('entry', NUMBERS, ids=lambda entry: entry.name)
-def test_the_ends_of_a_range_are_in_it(entry, end):
+@pytest.mark.parametrize('spec', NUMBERS, ids=lambda spec: spec.name)
+def test_the_ends_of_a_range_are_in_it(spec, end):
     """The core has ranges of its own, which must not be narrower."""
-    value = getattr(entry, end)
+    value = getattr(spec, end)
     others = dict(LENIENT)
-    if entry.name in {'physics_rate', 'publish_rate'} and value >= 10.0:
+    if spec.name in {'physics_rate', 'publish_rate'} and value >= 10.0:
         others |= {'physics_rate': value, 'publish_rate': value}
-    elif entry.name == 'wind.reference_height':
+    elif spec.name == 'wind.reference_height':
         others['wind.roughness_length'] = 0.0
-    configuration({**others, entry.name: value})
+    configuration({**others, spec.name: value})
 
 
-@pytest.mark.parametrize('entry', NUMBERS, ids=lambda entry: entry.name)
+@pytest.mark.parametrize('spec', NUMBERS, ids=lambda spec: spec.name)
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, '1', None, True, [1.0], 10**400])
-def test_a_number_is_finite_and_no_other_type(entry, value):
+def test_a_number_is_finite_and_no_other_type(spec, value):
     with pytest.raises(ConfigError) as refused:
-        configuration({entry.name: value})
-    assert refused.value.thing == entry.name
+        configuration({spec.name: value})
+    assert refused.value.thing == spec.name
 
 
-@pytest.mark.parametrize('entry', NUMBERS, ids=lambda entry: entry.name)
-def test_beyond_its_range_a_number_is_refused(entry):
-    step = 1 if isinstance(entry.default, int) else 1e-9 * max(1.0, entry.highest)
-    for value in (entry.lowest - step, entry.highest + step):
+@pytest.mark.parametrize('spec', NUMBERS, ids=lambda spec: spec.name)
+def test_beyond_its_range_a_number_is_refused(spec):
+    step = 1 if isinstance(spec.default, int) else 1e-9 * max(1.0, spec.highest)
+    for value in (spec.lowest - step, spec.highest + step):
         with pytest.raises(ConfigError, match='number from') as refused:
-            configuration({entry.name: value})
-        assert refused.value.thing == entry.name
+            configuration({spec.name: value})
+        assert refused.value.thing == spec.name
 
 
 @pytest.mark.parametrize(

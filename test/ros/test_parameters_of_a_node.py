@@ -81,7 +81,7 @@ def test_descriptions_show_range_unit_effect_and_choices(declared):
     (span,) = speed.floating_point_range
     assert (speed.type, span.from_value, span.to_value) == (Parameter.Type.DOUBLE.value, 0, 200)
     assert speed.description == (
-        'Speed over the ground. Unit: m/s. A change counts from the next throw on.'
+        'Speed over the ground. Unit: m/s. A change takes effect at the next throw.'
     )
     seed = described['imu.seed']
     (span,) = seed.integer_range

@@ -1,4 +1,4 @@
-"""What recorder_node records and how: its parameters, checked together, without ROS."""
+"""The parameters of recorder_node, checked together, without ROS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ from typing import Any
 
 from disc_sim_ros.bags.mcap_writer import COMPRESSIONS
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.ros.parameter_spec import ParameterSpec, checked
+from disc_sim_ros.quantities import RECORDING
+from disc_sim_ros.ros.parameter_spec import ParameterSpec, checked, spec_of
 
 _MIB = 1024 * 1024
-_LARGEST_MIB = 1_000_000  # a terabyte
-_LONGEST = 31_536_000.0  # s, a year
+_SHORTEST_FILE = 1e-3  # s
 
 RECORDER_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
     'Bag': (
@@ -21,44 +21,24 @@ RECORDER_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
             'bag',
             '',
             'fixed',
-            'Folder to make for the bag; empty: bags/disc_DATE_TIME, here.',
+            'New folder for the bag; empty: bags/disc_DATE_TIME in the current folder.',
             constraint='it must not exist',
         ),
-        ParameterSpec(
-            'max_size_mib',
-            0,
+        spec_of(RECORDING['max_size'], 'fixed', 'max_size_mib'),
+        spec_of(
+            RECORDING['max_duration'],
             'fixed',
-            'Size at which the next file of the bag begins; 0: never.',
-            'MiB',
-            0,
-            _LARGEST_MIB,
-        ),
-        ParameterSpec(
             'max_duration_s',
-            0.0,
-            'fixed',
-            'Time after which the next file of the bag begins; 0: never.',
-            's',
-            0.0,
-            _LONGEST,
-            constraint='0 or at least 0.001',
+            f'0 or at least {_SHORTEST_FILE:g}',
         ),
         ParameterSpec(
             'compression',
             'zstd',
             'fixed',
-            'Of the chunks in the files.',
+            'Compression of the chunks in the files.',
             choices=tuple(COMPRESSIONS),
         ),
-        ParameterSpec(
-            'flush_period',
-            0.5,
-            'fixed',
-            'Longest time that a message waits for the disk: what a power failure may cost.',
-            's',
-            0.01,
-            60.0,
-        ),
+        spec_of(RECORDING['flush_period'], 'fixed'),
     ),
     'What is recorded': (
         ParameterSpec(
@@ -66,42 +46,42 @@ RECORDER_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
             '',
             'fixed',
             'Names of topics to record, relative to the namespace of the node.',
-            constraint='with spaces between, or a list',
+            constraint='separated by spaces, or a list',
             listed=True,
         ),
         ParameterSpec(
             'regex',
             '',
             'fixed',
-            'Topics whose whole name matches are recorded; without it and `topics`, all are.',
+            'Topics whose whole name matches are recorded; with this and `topics` empty, all are.',
             constraint='a regular expression of Python',
         ),
         ParameterSpec(
             'exclude',
             '',
             'fixed',
-            'Topics whose whole name matches are not recorded, whatever else is said.',
+            'Topics whose whole name matches are never recorded.',
             constraint='a regular expression of Python',
         ),
         ParameterSpec(
             'start_paused',
             default=False,
             effect='fixed',
-            meaning='Record nothing until `~/resume` is called.',
+            meaning='Do not record until `~/resume` is called.',
         ),
     ),
 }
-RECORDER_TABLE = tuple(entry for group in RECORDER_GROUPS.values() for entry in group)
+RECORDER_TABLE = tuple(spec for group in RECORDER_GROUPS.values() for spec in group)
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which topics are recorded.
+    """The choice of topics to record.
 
     Attributes:
-        names: Full names; they are recorded also where they are hidden.
-        regex: Of more names; None for none.
-        exclude: Of names that are never recorded; None for none.
+        names: Full names; hidden topics among them are recorded, too.
+        regex: Pattern of further names, or None.
+        exclude: Pattern of names that are never recorded, or None.
     """
 
     names: frozenset[str] = frozenset()
@@ -110,11 +90,14 @@ class Selection:
 
     @property
     def everything(self) -> bool:
-        """Whether nobody said which topics are wanted."""
+        """Return True if neither names nor a pattern choose topics."""
         return not self.names and self.regex is None
 
     def takes(self, name: str) -> bool:
-        """Say whether a topic is recorded; a part that begins with _ hides it, as in rosbag2."""
+        """Return True if a topic is recorded.
+
+        As in rosbag2, a topic is hidden if a part of its name begins with _.
+        """
         if self.exclude is not None and self.exclude.fullmatch(name):
             return False
         if name in self.names:
@@ -147,18 +130,19 @@ class RecorderConfig:
 
 
 def recorder_config(values: Mapping[str, object], namespace: str = '/') -> RecorderConfig:
-    """Return what the parameters mean; those that are not given have their defaults.
+    """Return the configuration from the values of parameters, with defaults for the others.
 
     Args:
-        values: By name.
-        namespace: Of the node, in which relative names of topics are.
+        values: Values by name of the parameter.
+        namespace: Namespace of the node; relative names of topics are in it.
 
     Raises:
         ConfigError: A value is not allowed.
     """
     v: dict[str, Any] = checked(values, RECORDER_TABLE)
-    if 0.0 < v['max_duration_s'] < 1e-3:
-        raise ConfigError('max_duration_s', v['max_duration_s'], 'give 0 or at least 0.001 s')
+    if 0.0 < v['max_duration_s'] < _SHORTEST_FILE:
+        allowed = f'give 0 or at least {_SHORTEST_FILE:g} s'
+        raise ConfigError('max_duration_s', v['max_duration_s'], allowed, 'max_duration')
     names = frozenset(_full_name(name, namespace) for name in v['topics'].split())
     return RecorderConfig(
         bag=Path(v['bag'] or default_bag(datetime.now().astimezone())),
@@ -172,7 +156,7 @@ def recorder_config(values: Mapping[str, object], namespace: str = '/') -> Recor
 
 
 def default_bag(now: datetime) -> str:
-    """Return the folder of a bag that was given no name."""
+    """Return the default folder of a bag."""
     return f'bags/disc_{now:%Y-%m-%d_%H-%M-%S}'
 
 

@@ -1,11 +1,10 @@
-"""What the parameters of sim_node mean together: checked as a whole, without ROS."""
+"""The configuration of sim_node: its parameters checked together, without ROS."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
 import math
 from pathlib import Path
-import re
 from typing import Any
 
 from disc_sim_ros.errors import ConfigError
@@ -13,17 +12,18 @@ from disc_sim_ros.physics import disc_file, frames
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.launch import LIMITS, Launch
+from disc_sim_ros.physics.launch import Launch, require_above_ground
+from disc_sim_ros.quantities import STEP
 from disc_sim_ros.ros.parameter_spec import checked
-from disc_sim_ros.ros.sim.parameters import PREFIX_RULE, TABLE
+from disc_sim_ros.ros.sim.parameters import PARAMETER_OF, TABLE
+from disc_sim_ros.topics import Frames
 
-_FRAME_PREFIX = re.compile(r'([A-Za-z]\w*/)*([A-Za-z]\w*)?', re.ASCII)
 _INTEGER_RATIO = 1e-9  # relative; how far physics_rate / publish_rate may be from a whole number
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ImuConfig:
-    """The IMU: where it sits and how it errs. Axes are those of `disc_body`."""
+    """Position and errors of the IMU, in the axes of `disc_body`."""
 
     offset: tuple[float, ...]  # m, shape (3,), from the centre of mass
     accelerometer_noise: float  # m/s^2, standard deviation of a sample
@@ -35,7 +35,7 @@ class ImuConfig:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SimConfig:
-    """What sim_node shall do: all its parameters, checked together. Rates are in Hz, times in s.
+    """All parameters of sim_node, checked together. Rates are in Hz, times in s.
 
     Attributes:
         setup: The disc, the model, the air and the step 1 / `physics_rate`.
@@ -47,10 +47,10 @@ class SimConfig:
         publish_clock: Whether the node supplies `/clock`.
         start_time: First stamp; negative for the wall clock, or for 0 with `publish_clock`.
         command_timeout: Simulated time after which a command falls to zero.
-        auto_throw: Whether the node throws without being asked.
-        throw_period: From release to release; 0 is one throw.
-        ground: Whether a flight ends where z = 0 is crossed.
-        frame_prefix: What stands before the names of the frames.
+        auto_throw: Whether the node throws as soon as it is ready.
+        throw_period: Time from release to release; 0 is one throw.
+        ground: Whether a flight ends where the centre of the disc crosses z = 0.
+        frame_prefix: Prefix of the names of the frames.
         path_rate: Points of `path` a second; 0 is none.
         realtime_priority: SCHED_FIFO priority of the simulation thread; 0 is none.
         imu: The IMU.
@@ -75,7 +75,7 @@ class SimConfig:
 
 
 def configuration(values: Mapping[str, object]) -> SimConfig:
-    """Return what the parameters mean together; those that are not given have their defaults.
+    """Return the configuration from the values of parameters, with defaults for the others.
 
     Raises:
         ConfigError: A value is not allowed, or not together with the others; its `thing` is the
@@ -85,7 +85,16 @@ def configuration(values: Mapping[str, object]) -> SimConfig:
     try:
         return _configuration(v)
     except ConfigError as error:
-        raise _in_ros_words(error, v) from None
+        raise _of_parameter(error, v) from None
+
+
+def _of_parameter(error: ConfigError, v: Mapping[str, Any]) -> ConfigError:
+    """Return an error about a quantity with the name and the value of its parameter."""
+    if error.quantity == STEP.name:
+        allowed = f'its step is {error.value:g} s, and {error.allowed}'
+        return ConfigError('physics_rate', v['physics_rate'], allowed, 'physics_rate')
+    name = PARAMETER_OF.get(error.quantity, error.thing)
+    return ConfigError(name, v.get(name, error.value), error.allowed, error.quantity)
 
 
 def _configuration(v: Mapping[str, Any]) -> SimConfig:
@@ -100,13 +109,12 @@ def _configuration(v: Mapping[str, Any]) -> SimConfig:
     )
     launch = Launch(**_group(v, 'launch'))
     setup.check_step(launch.spin, launch.speed)
-    if v['ground'] and launch.height < 0.0:
-        raise ConfigError('launch.height', launch.height, 'with ground, release at 0 m or above')
+    if v['ground']:
+        require_above_ground(launch.height)
+    Frames.prefixed(v['frame_prefix'])
     if 0.0 < v['throw_period'] < setup.step:
         allowed = f'give 0 or at least one step, {setup.step:g} s'
-        raise ConfigError('throw_period', v['throw_period'], allowed)
-    if not _FRAME_PREFIX.fullmatch(v['frame_prefix']):
-        raise ConfigError('frame_prefix', v['frame_prefix'], f'give {PREFIX_RULE}')
+        raise ConfigError('throw_period', v['throw_period'], allowed, 'throw_period')
     return SimConfig(
         setup=setup,
         launch=launch,
@@ -137,7 +145,7 @@ def _steps_per_publish(physics_rate: float, publish_rate: float) -> int:
         f'physics_rate {physics_rate:g} Hz must be a whole multiple of it; '
         f'near are {" and ".join(f"{rate:.12g}" for rate in near)}'
     )
-    raise ConfigError('publish_rate', publish_rate, allowed)
+    raise ConfigError('publish_rate', publish_rate, allowed, 'publish_rate')
 
 
 def _disc(name: str) -> Disc:
@@ -146,40 +154,19 @@ def _disc(name: str) -> Disc:
     except ConfigError as error:
         if error.thing == 'disc':
             raise
-        raise ConfigError('disc', name, str(error)) from None
+        raise ConfigError('disc', name, str(error)) from None  # names the file and the key
 
 
 @lru_cache(maxsize=8)
 def _loaded(name: str, version: tuple[int, int] | None) -> Disc:
-    """Load a disc once: reading the YAML takes milliseconds, in which no other thread runs."""
+    """Load a disc once: reading the YAML takes milliseconds, in which other threads wait."""
     return disc_file.load_disc(name)
 
 
 def _version(name: str) -> tuple[int, int] | None:
-    """Return what changes when the file changes."""
+    """Return time and size of a file, which change when the file changes; None without one."""
     try:
         status = Path(name).stat()
     except (OSError, ValueError):
         return None
     return status.st_mtime_ns, status.st_size
-
-
-_ROS_NAMES = {
-    'density': 'air_density',
-    'step': 'physics_rate',
-    **{name: f'launch.{name}' for name in LIMITS},
-    **{f'wind {axis.upper()}': f'wind.{axis}' for axis in 'xyz'},
-    **{name: f'wind.{name}' for name in ('roughness_length', 'turbulence', 'seed')},
-    'reference_height': 'wind.reference_height',
-}
-
-
-def _in_ros_words(error: ConfigError, v: Mapping[str, Any]) -> ConfigError:
-    """Return an error of `core` with the name and the value of the parameter."""
-    name = _ROS_NAMES.get(error.thing, error.thing)
-    allowed = error.allowed
-    if name == 'physics_rate':
-        allowed = f'its step is {error.value:g} s, and {allowed}'
-    if name == 'wind.reference_height':
-        allowed = f'{allowed}, at least twice wind.roughness_length'
-    return ConfigError(name, v.get(name, error.value), allowed)

@@ -1,0 +1,283 @@
+"""The table of quantities: name, unit, range, default, sign and one sentence of each.
+
+This is the only place where these are written. Checks of dataclasses, command-line flags, ROS
+parameters, keys of disc files and columns of studies are derived from it.
+"""
+
+from math import inf
+
+from disc_sim_ros.validation import Quantity
+
+LARGEST_SEED = 2**63 - 1
+
+
+def _table(*quantities: Quantity) -> dict[str, Quantity]:
+    return {quantity.name: quantity for quantity in quantities}
+
+
+# A release; the fields of physics.launch.Launch.
+LAUNCH = _table(
+    Quantity('speed', 'm/s', 0.0, 200.0, 15.0, 'Speed over the ground'),
+    Quantity('pitch', 'degrees', -180.0, 180.0, 15.0, 'Pitch of the disc', 'nose up positive'),
+    Quantity(
+        'roll', 'degrees', -180.0, 180.0, 0.0, 'Roll of the disc', 'right edge down positive'
+    ),
+    Quantity(
+        'yaw', 'degrees', -360.0, 360.0, 0.0, 'Heading of the disc', 'right of +x positive'
+    ),
+    Quantity(
+        'angle_of_attack', 'degrees', -180.0, 180.0, 0.0,
+        'Angle of the velocity to the plane of the disc', 'velocity below the plane positive',
+    ),
+    Quantity(
+        'sideslip', 'degrees', -180.0, 180.0, 0.0,
+        'Angle of the velocity to the x axis of the disc, in its plane', 'to the right positive',
+    ),
+    Quantity(
+        'spin', 'rad/s', -1000.0, 1000.0, 31.416, 'Spin rate', 'clockwise from above positive'
+    ),
+    Quantity(
+        'roll_rate', 'rad/s', -1000.0, 1000.0, 0.0,
+        'Body rate p at release', 'right edge down positive',
+    ),
+    Quantity(
+        'pitch_rate', 'rad/s', -1000.0, 1000.0, 0.0, 'Body rate q at release', 'nose up positive'
+    ),
+    Quantity(
+        'height', 'm', -1000.0, 10000.0, 0.0,
+        'Height of the centre of the disc above the ground at release',
+    ),
+)  # fmt: skip
+ADVANCE_RATIO = Quantity(
+    'advance_ratio', '', -100.0, 100.0, None,
+    'Spin as r c / (2 speed), c the diameter of the disc', 'clockwise from above positive',
+)  # fmt: skip
+
+# The air; the fields of physics.environment.Wind and Air.
+MEAN_WIND = _table(
+    Quantity(
+        'wind_x', 'm/s', -100.0, 100.0, 0.0,
+        'Velocity of the air along x of `map`', 'forward positive',
+    ),
+    Quantity(
+        'wind_y', 'm/s', -100.0, 100.0, 0.0,
+        'Velocity of the air along y of `map`', 'left positive',
+    ),
+    Quantity(
+        'wind_z', 'm/s', -100.0, 100.0, 0.0, 'Velocity of the air along z of `map`', 'up positive'
+    ),
+)  # fmt: skip
+WIND = MEAN_WIND | _table(
+    Quantity(
+        'roughness_length', 'm', 0.0, 10.0, 0.0,
+        'Roughness length of a logarithmic profile of the wind over the height; 0: no profile',
+    ),
+    Quantity(
+        'reference_height', 'm', 0.1, 1000.0, 10.0,
+        'Height at which the profile has the velocities x and y',
+    ),
+    Quantity(
+        'turbulence', 'm/s', 0.0, 50.0, 0.0,
+        'Mean wind at 6 m height that sets the strength of the Dryden gusts (MIL-F-8785C): '
+        'about 8 light, 15 moderate, 23 severe; 0: no gusts',
+    ),
+    Quantity(
+        'gust_seed', '', 0, LARGEST_SEED, 0,
+        'Seed of the gusts; the same seed gives the same gusts', whole=True,
+    ),
+)  # fmt: skip
+AIR = _table(
+    Quantity('air_density', 'kg/m^3', 0.0, 100.0, 1.225, 'Density of the air'),
+    Quantity('gravity', 'm/s^2', 0.0, 100.0, 9.81, 'Acceleration of free fall'),
+)
+
+# A disc; the fields of physics.disc.Disc and LinearAero, with the unit the keys of disc files.
+DISC = _table(
+    Quantity('mass', 'kg', 0.0, inf, None, 'Mass', open=True),
+    Quantity('diameter', 'm', 0.0, inf, None, "Diameter, the paper's c", open=True),
+    Quantity('area', 'm^2', 0.0, inf, None, "Planform area, the paper's S", open=True),
+    Quantity(
+        'inertia_axial', 'kg m^2', 0.0, inf, None,
+        'Moment of inertia about the spin axis, I_z', open=True,
+    ),
+    Quantity(
+        'inertia_diametral', 'kg m^2', 0.0, inf, None,
+        'Moment of inertia about any diameter, I_x = I_y', open=True,
+    ),
+)  # fmt: skip
+DAMPING = _table(
+    Quantity('C_Lp', '', -inf, 0.0, 0.0, 'Roll damping, per p c / (2 V)'),
+    Quantity('C_Mq', '', -inf, 0.0, 0.0, 'Pitch damping, per q c / (2 V)'),
+    Quantity('C_Nr', '', -inf, 0.0, 0.0, 'Spin damping, per r c / (2 V)'),
+)
+LINEAR_AERO = _table(
+    Quantity('CL_0', '', -inf, inf, None, 'Lift coefficient at angle of attack 0'),
+    Quantity('CL_alpha', '1/rad', -inf, inf, None, 'Slope of the lift coefficient'),
+    Quantity('CD_0', '', 0.0, inf, None, 'Least drag coefficient'),
+    Quantity('CD_alpha', '1/rad^2', 0.0, inf, None, 'Growth of drag with (alpha - alpha_0)^2'),
+    Quantity('alpha_0', 'rad', -inf, inf, None, 'Angle of attack of the least drag'),
+    Quantity('CM_0', '', -inf, inf, None, 'Pitching moment at angle of attack 0'),
+    Quantity('CM_alpha', '1/rad', -inf, inf, None, 'Slope of the pitching moment'),
+)
+
+# Control inputs, in the paper's signs.
+CONTROL = _table(
+    Quantity(
+        'control_CL', '', -10.0, 10.0, 0.0,
+        'Control input: rolling moment coefficient', 'right edge down positive',
+    ),
+    Quantity(
+        'control_CM', '', -10.0, 10.0, 0.0,
+        'Control input: pitching moment coefficient', 'nose up positive',
+    ),
+    Quantity(
+        'control_CN', '', -10.0, 10.0, 0.0,
+        'Control input: yawing moment coefficient', 'clockwise from above positive',
+    ),
+)  # fmt: skip
+CONTROL_MOMENT = _table(
+    Quantity(
+        'control_L', 'N m', -1000.0, 1000.0, 0.0,
+        'Control input: rolling moment', 'right edge down positive',
+    ),
+    Quantity(
+        'control_M', 'N m', -1000.0, 1000.0, 0.0,
+        'Control input: pitching moment', 'nose up positive',
+    ),
+    Quantity(
+        'control_N', 'N m', -1000.0, 1000.0, 0.0,
+        'Control input: yawing moment', 'clockwise from above positive',
+    ),
+)  # fmt: skip
+
+# What a thrown state has besides the quantities of a launch; each component.
+POSITION = Quantity('position', 'm', -10000.0, 10000.0, None, 'Position in `map`')
+VELOCITY = Quantity(
+    'velocity', 'm/s', -LAUNCH['speed'].highest, LAUNCH['speed'].highest, None,
+    'Velocity over the ground in `disc`',
+)  # fmt: skip
+ORIENTATION = Quantity(
+    'orientation', '', -2.0, 2.0, None, 'Component of a quaternion before its length is checked'
+)
+
+# What may differ from flight to flight of an ensemble; the columns of studies.
+AERO_CHANGES = _table(
+    Quantity('lift_factor', '', 0.0, 10.0, 1.0, 'Factor of the lift coefficient'),
+    Quantity('drag_factor', '', 0.0, 10.0, 1.0, 'Factor of the drag coefficient'),
+    Quantity('pitching_factor', '', 0.0, 10.0, 1.0, 'Factor of the pitching moment coefficient'),
+    Quantity('lift_offset', '', -2.0, 2.0, 0.0, 'Added to the lift coefficient'),
+    Quantity('drag_offset', '', -2.0, 2.0, 0.0, 'Added to the drag coefficient'),
+    Quantity('pitching_offset', '', -2.0, 2.0, 0.0, 'Added to the pitching moment coefficient'),
+)
+VARIED = (
+    LAUNCH
+    | _table(ADVANCE_RATIO)
+    | MEAN_WIND
+    | CONTROL
+    | _table(
+        DISC['mass'].within(1e-3, 100.0),
+        DISC['inertia_axial'].within(1e-7, 100.0),
+        DISC['inertia_diametral'].within(1e-7, 100.0),
+        DAMPING['C_Lp'].within(-100.0),
+        DAMPING['C_Mq'].within(-100.0),
+        DAMPING['C_Nr'].within(-100.0),
+    )
+    | AIR
+    | AERO_CHANGES
+)
+
+# Steps, times and rates.
+STEP = Quantity('step', 's', 1e-6, 0.1, 1e-3, 'Integration step')
+DURATION = Quantity('duration', 's', 0.0, 3600.0, 60.0, 'Longest time of flight', open=True)
+SAMPLE_RATE = Quantity(
+    'sample_rate', 'Hz', 0.0, 1e5, 0.0, 'Samples of the trajectory a second; 0: no samples'
+)
+TIMING = _table(
+    Quantity('physics_rate', 'Hz', 10.0, 1e5, 1000.0, 'Integration steps a simulated second'),
+    Quantity(
+        'publish_rate', 'Hz', 0.1, 1e5, 200.0, 'Messages of each state topic a simulated second'
+    ),
+    Quantity(
+        'path_rate', 'Hz', 0.0, 1000.0, 20.0, 'Points of `path` a simulated second; 0: no path'
+    ),
+    Quantity(
+        'real_time_factor', '', 0.0, 1000.0, 1.0, 'Simulated seconds a second; 0: as fast as '
+        'possible',
+    ),
+    Quantity(
+        'throw_period', 's', 0.0, 86400.0, 0.0,
+        'Simulated time from release to release; 0: throw once',
+    ),
+    Quantity(
+        'command_timeout', 's', 0.001, 3600.0, 0.5,
+        'Simulated time after which a command that is not renewed falls to zero',
+    ),
+    # Stamps end at 2^31 s; this leaves a year and a half.
+    Quantity(
+        'start_time', 's', -1.0, 2.1e9, -1.0,
+        'First stamp; negative: the wall clock, or 0 with `publish_clock`',
+    ),
+    Quantity(
+        'realtime_priority', '', 0, 99, 0,
+        'SCHED_FIFO priority of the simulation thread; 0: ordinary scheduling', whole=True,
+    ),
+)  # fmt: skip
+
+# The IMU, in `disc_body`.
+_ZEROS = (0.0, 0.0, 0.0)
+IMU = _table(
+    Quantity(
+        'imu_offset', 'm', -10.0, 10.0, _ZEROS,
+        'Position of the IMU from the centre of mass in `disc_body`',
+    ),
+    Quantity(
+        'accelerometer_noise', 'm/s^2', 0.0, 1000.0, 0.0,
+        'Standard deviation of the white noise of the specific force, each axis and sample',
+    ),
+    Quantity(
+        'accelerometer_bias', 'm/s^2', -1000.0, 1000.0, _ZEROS,
+        'Constant error that is added to the specific force, in `disc_body`',
+    ),
+    Quantity(
+        'gyroscope_noise', 'rad/s', 0.0, 100.0, 0.0,
+        'Standard deviation of the white noise of the angular velocity, each axis and sample',
+    ),
+    Quantity(
+        'gyroscope_bias', 'rad/s', -100.0, 100.0, _ZEROS,
+        'Constant error that is added to the angular velocity, in `disc_body`',
+    ),
+    Quantity(
+        'imu_seed', '', 0, LARGEST_SEED, 0,
+        'Seed of the noise; the same seed gives the same noise', whole=True,
+    ),
+)  # fmt: skip
+
+# Limits of the files of a bag.
+RECORDING = _table(
+    Quantity(
+        'max_size', 'MiB', 0, 1_000_000, 0,
+        'Size at which the next file of the bag begins; 0: never', whole=True,
+    ),
+    Quantity(
+        'max_duration', 's', 0.0, 31_536_000.0, 0.0,
+        'Time after which the next file of the bag begins; 0: never',
+    ),
+    Quantity(
+        'flush_period', 's', 0.01, 60.0, 0.5,
+        'Longest time that a message waits for the disk; a power failure may cost as much',
+    ),
+)  # fmt: skip
+
+# Every quantity by name, in its whole range.
+QUANTITIES = {
+    **VARIED,
+    **WIND,
+    **DISC,
+    **DAMPING,
+    **LINEAR_AERO,
+    **CONTROL_MOMENT,
+    **TIMING,
+    **IMU,
+    **RECORDING,
+    **_table(POSITION, VELOCITY, ORIENTATION, STEP, DURATION, SAMPLE_RATE),
+}
