@@ -8,10 +8,12 @@ from setuptools import Distribution, find_packages, setup
 
 NAME = 'disc_sim_ros'
 
-# A new executable is one line here and one file in scripts/, a copy of scripts/fly with its name.
+# A new executable is one line here, one in cli/disc_sim.py and one file in scripts/, a copy of
+# scripts/fly with another name.
 EXECUTABLES = {
     'analyse_bag': 'disc_sim_ros.cli.analyse_bag:main',
     'demo': 'disc_sim_ros.cli.demo:main',
+    'disc-sim': 'disc_sim_ros.cli.disc_sim:main',
     'fly': 'disc_sim_ros.cli.fly:main',
     'optimise': 'disc_sim_ros.cli.optimise:main',
     'paper_figures': 'disc_sim_ros.cli.paper_figures:main',

@@ -1,124 +1,106 @@
-"""`analyse_bag`: what a bag tells of the flights in it, and whether it is true. No ROS."""
+"""`analyse_bag`: summarises, verifies and plots the flights in an MCAP bag, without ROS."""
 
 import argparse
+from collections.abc import Sequence
 import json
 import math
 from pathlib import Path
-import signal
 import sys
 from typing import TYPE_CHECKING, Any
 
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
+from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from disc_sim_ros.analysis.bag_report import Analysis
     from disc_sim_ros.analysis.recording import Disc
     from disc_sim_ros.bags.reader import Bag
 
-DIFFERENT = 3  # exit code
-PLOTS = ('png', 'svg', 'pdf')
 
-
-def parser() -> Parser:
+def parser(prog: str = 'analyse_bag') -> Parser:
     """Return the command line of `analyse_bag`."""
     p = Parser(
-        prog='analyse_bag',
-        description='Tell of the flights in a bag: launch, landing (m, s), commands, wind and how '
-        'complete its messages are. A bag of sim_node, or any MCAP bag with nav_msgs/Odometry or '
-        'geometry_msgs/PoseStamped. Angles have the signs of Crowther & Potts (2007), in degrees; '
-        'positions are in map axes: x forward, y left, z up.',
+        prog=prog,
+        description='Summarise the flights in a bag: launch, landing (m, s), commands, wind, and '
+        'how complete the recording is. Reads bags of sim_node and any MCAP bag with '
+        'nav_msgs/Odometry or geometry_msgs/PoseStamped. Angles are in degrees with the signs of '
+        'Crowther & Potts (2007); positions are in map axes: x forward, y left, z up.',
         epilog='Exit code 0; 1: the bag is damaged; 2: bad input; 3: --verify found a difference.',
     )
+    p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     p.add_argument('bag', metavar='BAG', help='folder of the bag, or one .mcap file')
     p.add_argument(
         '--verify',
         action='store_true',
-        help='fly each recorded release, wind, command and seed again and compare with the '
-        'recorded odometry; of other bags check stamps, quaternions and velocities',
+        help='compute each flight again from the recorded release, wind, commands and seed, and '
+        'compare it with the recorded odometry; in bags of other programs, check stamps, '
+        'quaternions and velocities',
     )
-    p.add_argument('--json', action='store_true', help='print one JSON document instead')
     p.add_argument(
-        '--plot',
-        default=argparse.SUPPRESS,
-        metavar='FILE.png',
-        help='write a plot too; the name ends in .png, .svg or .pdf',
+        '--json', action='store_true', help='print one JSON document instead of the summary'
     )
+    output.add_plot(p)
     p.add_argument(
         '--disc',
         default=argparse.SUPPRESS,
         metavar='NAME',
-        help='only this disc: its name in the report, its namespace or its frame',
+        help='only this disc, by its name in the report, its namespace or its frame',
     )
     p.add_argument(
         '--topic',
         default=argparse.SUPPRESS,
         metavar='NAME',
-        help='take the motion from this topic (default: from every Odometry)',
+        help='read the motion from this topic (default: from every Odometry topic)',
     )
     return p
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run `analyse_bag`; return its exit code."""
-    output.mend_streams()
-    p = parser()
-    chosen = p.parse_args(arguments)
-    try:
-        return _run(chosen)
-    except ConfigError as error:
-        p.error(str(error))
-    except DiscSimError as error:
-        sys.stderr.write(f'analyse_bag: error: {error}\n')
-        return 1
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
+def main(arguments: Sequence[str] | None = None, prog: str = 'analyse_bag') -> int:
+    """Run `analyse_bag` and return its exit code."""
+    return run_program(parser(prog), _run, arguments)
 
 
 def _run(chosen: argparse.Namespace) -> int:
     plot = getattr(chosen, 'plot', None)
     if plot is not None:
-        if Path(plot).suffix.removeprefix('.').lower() not in PLOTS:
-            raise ConfigError('--plot', plot, 'the name must end in .png, .svg or .pdf')
-        output.check_writable('--plot', plot)
-    # What takes a second to import is imported when the flags are known to be right.
+        output.check_plot(plot)
+    # Imported once the flags are known to be right: they take a second.
     from disc_sim_ros.analysis import bag_report, flights, recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
-    from disc_sim_ros.errors import BagError  # noqa: PLC0415
 
     try:
         bag = open_bag(chosen.bag)
         discs = recording.discs(bag, getattr(chosen, 'topic', None))
     except BagError as error:
-        sys.stderr.write(f'analyse_bag: error: {error}\n')
-        return 2
+        output.note(chosen.prog, f'error: {error}')
+        return BAD_INPUT
     discs = _chosen_discs(discs, getattr(chosen, 'disc', None))
     doubts = _doubts(bag)
     if not bag.complete:
-        _note(f'{chosen.bag} was not ended or is damaged; `repair_bag` makes it whole')
-    found = [
+        text = 'was not closed or is damaged; `repair_bag` makes a complete copy'
+        output.note(chosen.prog, f'note: {chosen.bag} {text}')
+    analysed = [
         (disc, [bag_report.analyse(f, doubts) for f in flights.flights(disc)]) for disc in discs
     ]
+    every = [a for _, analyses in analysed for a in analyses]
     if plot is not None:
-        _plot(plot, chosen.bag, [a for _, analyses in found for a in analyses])
+        _plot(plot, chosen.bag, every)
     if chosen.json:
         document = _bag_document(bag) | {
-            'discs': [_disc_document(disc, analyses, chosen) for disc, analyses in found]
+            'discs': [_disc_document(disc, analyses, chosen) for disc, analyses in analysed]
         }
         output.show(json.dumps(_finite(document), allow_nan=False))
     else:
         lines = _bag_lines(bag)
-        for disc, analyses in found:
+        for disc, analyses in analysed:
             lines += _disc_lines(disc, analyses, verify=chosen.verify)
         if plot is not None:
             lines.append(f'wrote {plot}')
         output.show('\n'.join(lines))
-    every = [a for _, analyses in found for a in analyses]
     return DIFFERENT if chosen.verify and not all(map(bag_report.passed, every)) else 0
 
 
@@ -137,24 +119,22 @@ def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
 
 
 def _doubts(bag: 'Bag') -> tuple[str, ...]:
-    """Return why a whole bag may lack messages."""
+    """Return the reasons why messages may be missing from the bag."""
     from disc_sim_ros.analysis.bag_report import losses  # noqa: PLC0415
 
     doubts = [f'{key}: {value}' for key, value in losses(bag.custom_data)]
     if not bag.complete:
-        doubts.append('the bag was not ended or is damaged')
+        doubts.append('the bag was not closed or is damaged')
     return tuple(doubts)
 
 
 def _plot(name: str, bag: str, analyses: 'Sequence[Analysis]') -> None:
     if not analyses:
-        raise DiscSimError(f'{bag}: nothing flies in it, there is no plot to make')
-    from disc_sim_ros.analysis import bag_plots, plots  # noqa: PLC0415
+        raise DiscSimError(f'{bag}: there is no flight to plot')
+    from disc_sim_ros.analysis import bag_plots  # noqa: PLC0415 - matplotlib
 
     title = bag_plots.title(analyses[0]) if len(analyses) == 1 else Path(bag).name
-    figure = bag_plots.bag_figure(analyses, title)
-    kind = Path(name).suffix.removeprefix('.').lower()
-    output.write_whole('--plot', name, plots.image(figure, kind))
+    output.write_plot(name, bag_plots.bag_figure(analyses, title))
 
 
 def _bag_document(bag: 'Bag') -> dict[str, Any]:
@@ -227,7 +207,7 @@ def _disc_lines(disc: 'Disc', analyses: 'Sequence[Analysis]', *, verify: bool) -
 
     lines = [f'{disc.name}: {disc.motion.topic}, {len(disc.motion)} messages']
     if not analyses:
-        lines.append('  no flight: nothing was thrown, and nothing moves')
+        lines.append('  no flight: no throw was recorded, and the disc does not move')
     for a in analyses:
         lines.append(bag_text.summary(a))
         if verify:
@@ -236,7 +216,7 @@ def _disc_lines(disc: 'Disc', analyses: 'Sequence[Analysis]', *, verify: bool) -
 
 
 def _finite(value: Any) -> Any:
-    """Return a document with null for numbers that JSON does not know."""
+    """Return a document with null instead of NaN and infinity, which JSON does not have."""
     match value:
         case dict():
             return {key: _finite(x) for key, x in value.items()}
@@ -253,10 +233,6 @@ def _seconds(bag: 'Bag') -> float:
 
 def _rate(count: int, seconds: float) -> float | None:
     return (count - 1) / seconds if count > 1 and seconds > 0.0 else None
-
-
-def _note(text: str) -> None:
-    sys.stderr.write(f'analyse_bag: note: {text}\n')
 
 
 if __name__ == '__main__':

@@ -1,7 +1,7 @@
-"""`demo`: throw one disc in real time with the simulator and the recorder, and show the result."""
+"""`demo`: throws one disc in real time, records the flight and analyses the bag."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
@@ -15,32 +15,33 @@ import disc_sim_ros
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.main import DIFFERENT, run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
 
 if TYPE_CHECKING:
     from disc_sim_ros.ros.client import Seen
 
-DIFFERENT = 3  # exit code, as of analyse_bag
-HELD = 3600.0  # s that --control acts without being renewed: the whole flight
+WHOLE_FLIGHT = 3600.0  # s that --control acts without being renewed
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def parser() -> Parser:
+def parser(prog: str = 'demo') -> Parser:
     """Return the command line of `demo`."""
     p = Parser(
-        prog='demo',
+        prog=prog,
         description='Start sim_node and recorder_node in a ROS domain of their own, throw one '
-        'disc in real time, and leave a bag, a plot and a summary. Angles and control inputs have '
+        'disc in real time, and write a bag, a plot and a summary. Angles and control inputs have '
         f'the signs of {flags.PAPER}. Needs ROS 2 Jazzy.',
-        epilog='Exit code 0; 1: something failed; 2: bad input; 3: the flight computed again from '
+        epilog='Exit code 0; 1: a program failed; 2: bad input; 3: the flight computed again from '
         'the bag differs from the recorded one.',
     )
+    p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     flags.add_disc(p)
     flags.add_launch(p)
-    flags.add_air(p, 'air and controls')
-    kept = p.add_argument_group('what is kept')
+    flags.add_air(p, 'air and control inputs')
+    kept = p.add_argument_group('recording')
     text = 'longest time to wait for the landing'
     flags.add_number(kept, '--seconds', 60.0, 0.1, flight.LONGEST, 's', 'S', text)
     kept.add_argument(
@@ -53,49 +54,42 @@ def parser() -> Parser:
     return p
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run `demo`; return its exit code."""
-    output.mend_streams()
-    p = parser()
-    chosen = p.parse_args(arguments)
-    try:
-        return _run(chosen)
-    except ConfigError as error:
-        thing = flags.flag_of(error, chosen)
-        p.error(str(ConfigError({'bag': '--bag'}.get(thing, thing), error.value, error.allowed)))
-    except DiscSimError as error:
-        sys.stderr.write(f'demo: error: {error}\n')
-        return 1
-    except KeyboardInterrupt as end:
-        number = end.args[0] if end.args else signal.SIGINT
-        return 128 + int(number)
+def main(arguments: Sequence[str] | None = None, prog: str = 'demo') -> int:
+    """Run `demo` and return its exit code."""
+    return run_program(parser(prog), _run, arguments, in_flags=_in_flags)
+
+
+def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
+    """Return an error that names the flag."""
+    flag = flags.flag_of(error, chosen)
+    return ConfigError('--bag' if flag == 'bag' else flag, error.value, error.allowed)
 
 
 def _run(chosen: argparse.Namespace) -> int:
     release, setup = flags.thrown(chosen)
     flight.check_flight(release, setup, chosen.seconds, ground=True, sample_rate=0.0)
     try:
-        from disc_sim_ros.ros import client, processes  # noqa: F401, PLC0415 - to see that ROS is there
+        from disc_sim_ros.ros import client, processes  # noqa: F401, PLC0415 - is ROS installed?
         from disc_sim_ros.ros.sim.config import configuration  # noqa: PLC0415
     except ImportError as error:
         raise DiscSimError(
             f'it needs rclpy and the message packages of ROS 2 Jazzy ({error}); '
-            '`fly --plot FILE.png` throws without them'
+            '`fly --plot FILE.png` works without them'
         ) from None
     parameters = flags.parameters(chosen, release, setup)
-    configuration(parameters)  # what the simulator would refuse is refused here
-    bag, plot = _places(getattr(chosen, 'bag', None))
+    configuration(parameters)  # refuse here what the simulator would refuse
+    bag, plot = _new_paths(getattr(chosen, 'bag', None))
     try:
         with _Signals() as signals:
             _record(chosen, parameters, bag, signals)
     finally:
         with suppress(OSError):
-            bag.parent.rmdir()  # only where nothing was recorded
+            bag.parent.rmdir()  # removes it only if nothing was recorded
     return _report(bag, plot)
 
 
-def _places(bag: str | None) -> tuple[Path, Path]:
-    """Return where the bag and the plot go; neither exists.
+def _new_paths(bag: str | None) -> tuple[Path, Path]:
+    """Return the paths of the bag and of the plot; neither exists.
 
     Raises:
         ConfigError: The bag exists, or its folder cannot be made.
@@ -125,11 +119,11 @@ def _make(folder: Path, thing: str, value: str) -> None:
 
 
 class _Signals:
-    """Lets Ctrl-C, SIGTERM and the end of the terminal end the block in order, but only once."""
+    """Turns the first SIGINT, SIGTERM or SIGHUP in its block into a KeyboardInterrupt."""
 
     def __init__(self) -> None:
-        self._holding = False
-        self._came = 0
+        self._held = False
+        self._received = 0
 
     def __enter__(self) -> Self:
         self._before = {number: signal.signal(number, self._take) for number in _SIGNALS}
@@ -141,20 +135,20 @@ class _Signals:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Let signals wait for the end of this block: no process is started and forgotten."""
-        self._holding = True
+        """Delay signals to the end of this block, so that each started process is known."""
+        self._held = True
         try:
             yield
         finally:
-            self._holding = False
-        if self._came:
-            raise KeyboardInterrupt(self._came)
+            self._held = False
+        if self._received:
+            raise KeyboardInterrupt(self._received)
 
     def _take(self, number: int, _: object) -> None:
-        for other in _SIGNALS:  # the end is on its way
+        for other in _SIGNALS:  # this program is ending already
             signal.signal(other, signal.SIG_IGN)
-        self._came = number
-        if not self._holding:
+        self._received = number
+        if not self._held:
             raise KeyboardInterrupt(number)
 
 
@@ -168,8 +162,8 @@ def _record(
     from disc_sim_ros.ros import client, processes  # noqa: PLC0415
 
     control = flags.control_of(chosen)
-    parameters |= {'auto_throw': False, 'command_timeout': HELD}
-    progress = _Progress()
+    parameters |= {'auto_throw': False, 'command_timeout': WHOLE_FLIGHT}
+    progress = _Progress(chosen.prog)
     with ExitStack() as stack:
         domain = stack.enter_context(processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='demo_')))
@@ -194,24 +188,25 @@ def _record(
 
 
 class _Progress:
-    """Lines on stderr; on a terminal also one that changes."""
+    """Lines on stderr; on a terminal also the state of the disc, in a line that is updated."""
 
-    def __init__(self) -> None:
+    def __init__(self, prog: str) -> None:
+        self._prog = prog
         self._live = sys.stderr.isatty()
         self._open = False
 
     def line(self, text: str) -> None:
         """Write a line."""
-        sys.stderr.write(('\n' if self._open else '') + f'demo: {text}\n')
+        sys.stderr.write(('\n' if self._open else '') + f'{self._prog}: {text}\n')
         sys.stderr.flush()
         self._open = False
 
-    def show(self, seen: 'Seen') -> None:
-        """Show the disc, on a terminal."""
+    def show(self, state: 'Seen') -> None:
+        """Show the state of the disc, on a terminal."""
         if self._live:
             sys.stderr.write(
-                f'\r  {seen.time:5.1f} s  height {seen.height:6.2f} m  '
-                f'speed {seen.speed:5.2f} m/s '
+                f'\r  {state.time:5.1f} s  height {state.height:6.2f} m  '
+                f'speed {state.speed:5.2f} m/s '
             )
             sys.stderr.flush()
             self._open = True
@@ -226,7 +221,7 @@ def _report(bag: Path, plot: Path) -> int:
     disc = recording.discs(opened, '/odom')[0]
     analyses = [bag_report.analyse(f) for f in flights.flights(disc)]
     if not analyses:
-        raise DiscSimError(f'{bag}: the throw is not in the bag')
+        raise DiscSimError(f'{bag}: the bag does not hold the throw')
     title = bag_plots.title(analyses[0])
     image = plots.image(bag_plots.bag_figure(analyses, title), 'png')
     output.write_whole('--bag', str(plot), image)
@@ -242,8 +237,8 @@ def _report(bag: Path, plot: Path) -> int:
     lines += [
         f'  {bag}',
         f'  {plot}',
-        'to look at it',
-        f'  {_beside_this()}analyse_bag --verify {bag}',
+        'next',
+        f'  {_program_folder()}analyse_bag --verify {bag}',
         f'  ros2 bag play {bag}    (in an installation of ROS 2)',
         f'  Foxglove: open {opened.files[0]} with the layout {_layout()}',
     ]
@@ -251,22 +246,22 @@ def _report(bag: Path, plot: Path) -> int:
     return 0 if all(map(bag_report.passed, analyses)) else DIFFERENT
 
 
-def _beside_this() -> str:
-    """Return what to put before the name of a program: its folder, unless a shell finds it."""
+def _program_folder() -> str:
+    """Return the folder of the programs with a slash, or '' if it is first in the PATH."""
     folder = Path(sys.executable).parent
-    found = shutil.which('analyse_bag')
-    return '' if found and Path(found).parent == folder else f'{_short(folder)}/'
+    first = shutil.which('analyse_bag')
+    return '' if first and Path(first).parent == folder else f'{_short(folder)}/'
 
 
 def _layout() -> Path:
-    """Return where the layout for Foxglove is."""
+    """Return the path of the layout for Foxglove."""
     name = Path('config', 'foxglove_layout.json')
     source = Path(disc_sim_ros.__file__).parents[1] / name
     return _short(source) if source.is_file() else Path(sys.prefix, 'share', 'disc_sim_ros', name)
 
 
 def _short(path: Path) -> Path:
-    """Return a path as short as can be, from here."""
+    """Return a path relative to the working directory where it lies below that."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path
 

@@ -1,23 +1,21 @@
-"""`fly`: one flight of one disc, without ROS."""
+"""`fly`: computes one flight of one disc, without ROS."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 import json
-from pathlib import Path
-import signal
 import sys
 import time
 
 from disc_sim_ros import __version__, files
 from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser, number
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.cli.main import run_program
+from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.launch import Launch
 
 DEFAULT_RATE = 100.0  # Hz, of files without --samples
-PLOTS = ('png', 'svg', 'pdf')
 _FLAG_OF = {
     'duration': '--duration',
     'sample_rate': '--samples',
@@ -26,123 +24,115 @@ _FLAG_OF = {
 _HINTS = {'--height': ', or give --no-ground'}
 
 
-def parser() -> Parser:
+def parser(prog: str = 'fly') -> Parser:
     """Return the command line of `fly`."""
     p = Parser(
-        prog='fly',
-        description='Fly one disc from its release to the ground, without ROS. Angles and control '
-        f'inputs have the signs of {flags.PAPER}; positions, velocities and wind are in map '
-        'axes: x forward, y left, z up.',
+        prog=prog,
+        description='Compute the flight of one disc from its release to the ground, without ROS. '
+        f'Angles and control inputs have the signs of {flags.PAPER}; positions, velocities and '
+        'wind are in map axes: x forward, y left, z up.',
     )
+    p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     flags.add_disc(p)
     flags.add_launch(p)
-    around = flags.add_air(p, 'air, controls and end')
+    around = flags.add_air(p, 'air, control inputs and end of the flight')
     text = 'longest time of flight'
     flags.add_number(around, '--duration', 60.0, 1e-6, flight.LONGEST, 's', 'S', text)
     around.add_argument(
-        '--no-ground', action='store_true', help='fly on below z = 0, for the whole duration'
+        '--no-ground',
+        action='store_true',
+        help='continue below z = 0, for the whole --duration',
     )
 
-    shown = p.add_argument_group('what comes out (without a flag: a summary to read)')
+    shown = p.add_argument_group('output (default: a summary to read)')
     shown.add_argument(
         '--samples',
         type=number(1e-3, 1e4, 'Hz'),
         default=argparse.SUPPRESS,
         metavar='HZ',
-        help=f'samples per second, evenly timed; from 0.001 to 10000 (default: {DEFAULT_RATE:g} '
-        f'in files, {flags.PUBLISH_RATE:g} in bags, else none)',
+        help='samples per second, evenly spaced in time; from 0.001 to 10000 (default: '
+        f'{DEFAULT_RATE:g} in files, {flags.PUBLISH_RATE:g} in bags, otherwise no samples)',
     )
     shape = shown.add_mutually_exclusive_group()
-    shape.add_argument('--json', action='store_true', help='print one JSON document instead')
     shape.add_argument(
-        '--csv', default=argparse.SUPPRESS, metavar='FILE', help='write the samples as CSV too'
+        '--json', action='store_true', help='print one JSON document instead of the summary'
     )
     shape.add_argument(
-        '--plot',
-        default=argparse.SUPPRESS,
-        metavar='FILE.png',
-        help='write a plot too; the name ends in .png, .svg or .pdf',
+        '--csv', default=argparse.SUPPRESS, metavar='FILE', help='also write the samples as CSV'
     )
+    output.add_plot(shape)
     shape.add_argument(
         '--bag',
         default=argparse.SUPPRESS,
         metavar='DIR',
-        help='write the bag too that sim_node and recorder_node would; a new folder. Its stamps '
-        'begin at the present second. Needs the message packages of ROS 2',
+        help='also write the bag that sim_node and recorder_node would record of this flight, to '
+        'a new folder; its time stamps start at the current second; needs the message packages '
+        'of ROS 2',
     )
     return p
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run `fly`; return its exit code: 0, 1 for a failed flight, 2 for bad input."""
-    output.mend_streams()
-    p = parser()
-    chosen = p.parse_args(arguments)
-    try:
-        _run(chosen)
-    except ConfigError as error:
-        thing = flags.flag_of(error, chosen)
-        thing = _FLAG_OF.get(thing, thing)
-        allowed = error.allowed + _HINTS.get(thing, '')
-        p.error(str(ConfigError(thing, error.value, allowed)))
-    except DiscSimError as error:
-        sys.stderr.write(f'fly: error: {error}\n')
-        return 1
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
-    return 0
+def main(arguments: Sequence[str] | None = None, prog: str = 'fly') -> int:
+    """Run `fly` and return its exit code: 0, 1 for a failed flight, 2 for bad input."""
+    return run_program(parser(prog), _run, arguments, in_flags=_in_flags)
 
 
-def _run(chosen: argparse.Namespace) -> None:
+def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
+    """Return an error that names the flag and, for a release below the ground, the remedy."""
+    flag = flags.flag_of(error, chosen)
+    flag = _FLAG_OF.get(flag, flag)
+    return ConfigError(flag, error.value, error.allowed + _HINTS.get(flag, ''))
+
+
+def _run(chosen: argparse.Namespace) -> int:
     csv, plot, bag = (getattr(chosen, name, None) for name in ('csv', 'plot', 'bag'))
     if csv is not None:
         output.check_writable('--csv', csv)
     if plot is not None:
-        if _ending(plot) not in PLOTS:
-            raise ConfigError('--plot', plot, 'the name must end in .png, .svg or .pdf')
-        output.check_writable('--plot', plot)
+        output.check_plot(plot)
     in_file = csv is not None or plot is not None
     rate = getattr(chosen, 'samples', DEFAULT_RATE if in_file else 0.0)
     release, setup = flags.thrown(chosen)
     write = None if bag is None else _bag_writer(chosen, bag, release, setup)
 
-    found = _fly(chosen, release, setup, 0.0 if bag is not None else rate)
-    # Reports and plots are imported where they are needed: matplotlib takes half a second.
-    from disc_sim_ros.analysis import flight_report  # noqa: PLC0415
+    flown = _fly(chosen, release, setup, 0.0 if bag is not None else rate)
+    from disc_sim_ros.analysis import flight_report  # noqa: PLC0415 - not before it is needed
 
     if chosen.json:
-        document = flight_report.document(found)
-        document['launch']['disc'] = chosen.disc  # of a file its path, which finds it again
+        document = flight_report.document(flown)
+        document['launch']['disc'] = chosen.disc  # of a file its path, so that it can fly again
         output.show(json.dumps(document, allow_nan=False))
-        return
-    lines = [flight_report.summary(found)]
+        return 0
+    lines = [flight_report.summary(flown)]
     if csv is not None:
-        output.write_whole('--csv', csv, flight_report.csv_text(found.trajectory).encode())
-        lines.append(f'  wrote   {csv}, {len(found.trajectory)} rows')
+        output.write_whole('--csv', csv, flight_report.csv_text(flown.trajectory).encode())
+        lines.append(f'  wrote   {csv}, {len(flown.trajectory)} rows')
     elif plot is not None:
-        from disc_sim_ros.analysis import plots  # noqa: PLC0415
+        from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
 
-        figure = plots.flight_figure(found)
-        output.write_whole('--plot', plot, plots.image(figure, _ending(plot)))
+        output.write_plot(plot, plots.flight_figure(flown))
         lines.append(f'  wrote   {plot}')
     elif write is not None:
         lines.append(f'  wrote   {write()}')
     elif rate > 0.0:
-        lines.append(flight_report.samples_text(found.trajectory))
+        lines.append(flight_report.samples_text(flown.trajectory))
     output.show('\n'.join(lines))
+    return 0
 
 
 def _fly(
     chosen: argparse.Namespace, release: Launch, setup: flight.Setup, rate: float
 ) -> flight.Flight:
     ground = not chosen.no_ground
-    # Before any note: what is refused says one line.
+    # Before any note: bad input prints one line only.
     flight.check_flight(release, setup, chosen.duration, ground=ground, sample_rate=rate)
     if chosen.model == 'precession' and (release.roll_rate or release.pitch_rate):
-        _note('--roll-rate and --pitch-rate change nothing: the precession model sets both itself')
+        text = 'the precession model computes both rates itself'
+        output.note(chosen.prog, f'note: --roll-rate and --pitch-rate have no effect: {text}')
     if not flight.is_ready():
-        _note('compiling the equations of motion, once on this machine, about 10 s')
+        text = 'compiling the equations of motion, once on this machine, about 10 s'
+        output.note(chosen.prog, f'note: {text}')
     with output.ended_by_ctrl_c():
         return flight.fly(
             release,
@@ -157,12 +147,12 @@ def _fly(
 def _bag_writer(
     chosen: argparse.Namespace, bag: str, release: Launch, setup: flight.Setup
 ) -> Callable[[], str]:
-    """Return the function that writes the bag and tells what it wrote.
+    """Return the function that writes the bag and returns a line about it.
 
     Raises:
-        ConfigError: The bag cannot be written, without the flight being flown.
+        ConfigError: The bag cannot be written; checked before the flight is computed.
     """
-    try:  # half a second, and not everywhere
+    try:  # takes half a second, and ROS may be missing
         from disc_sim_ros.ros.sim import offline_bag  # noqa: PLC0415
         from disc_sim_ros.ros.sim.config import configuration  # noqa: PLC0415
     except ImportError as error:
@@ -187,14 +177,6 @@ def _bag_writer(
         return f'{bag}: {total} messages of {topics} topics, {written.size / 1e6:.1f} MB'
 
     return write
-
-
-def _ending(name: str) -> str:
-    return Path(name).suffix.removeprefix('.').lower()
-
-
-def _note(text: str) -> None:
-    sys.stderr.write(f'fly: note: {text}\n')
 
 
 if __name__ == '__main__':

@@ -1,12 +1,11 @@
-"""`optimise`: the launch that reaches furthest, flies longest or hits best, without ROS."""
+"""`optimise`: searches the launch with the best range, time of flight or accuracy, without ROS."""
 
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 import json
 import math
-from pathlib import Path
-import signal
 import sys
 from typing import TYPE_CHECKING
 
@@ -14,14 +13,14 @@ from disc_sim_ros import __version__
 from disc_sim_ros.cli import flags as throw_flags
 from disc_sim_ros.cli import output, study_flags
 from disc_sim_ros.cli.arguments import Parser, number
+from disc_sim_ros.cli.main import UsageError, run_program
 from disc_sim_ros.cli.study_flags import listed
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 
 if TYPE_CHECKING:
     from disc_sim_ros.studies.optimise import Problem
 
-PLOTS = ('png', 'svg', 'pdf')
 DEFAULT_COUNT = 256  # throws of each launch under scatter
 _FLAG_OF = {
     'goal': '--for',
@@ -35,24 +34,29 @@ _FLAG_OF = {
 }
 
 
-def parser() -> Parser:
+def parser(prog: str = 'optimise') -> Parser:
     """Return the command line of `optimise`."""
     p = Parser(
-        prog='optimise',
+        prog=prog,
         conflict_handler='resolve',  # --seed and --step mean more here than in `fly`
         description='Search the launch with the greatest range or time of flight, or the least '
-        'distance from a target, within human limits, in wind, and under human scatter if asked. '
-        'A flag of `fly` that is given holds; the others of the limits are free. Angles have the '
-        f'signs of {throw_flags.PAPER}; positions and wind are in map axes: x forward, y left, z '
-        'up.',
-        epilog=f'{_defaults_text()} {study_flags.names_text()} Exit code 0; 1: a failed '
-        'search; 2: bad input.',
+        "distance from a target, within a thrower's limits: in wind, and with the scatter of a "
+        'thrower where --scatter is given. A quantity whose `fly` flag is given is fixed; the '
+        'other limited quantities are free. Angles have the signs of '
+        f'{throw_flags.PAPER}; positions and wind are in map axes: x forward, y left, z up.',
+        epilog=f'{_defaults_text()} {study_flags.names_text()} Exit code 0; 1: the search '
+        'failed; 2: bad input.',
     )
+    p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     study_flags.add_throw(p, ground=False)
-    what = p.add_argument_group('what is best')
+    what = p.add_argument_group('goal and search')
     what.add_argument(
-        '--for', choices=('range', 'time', 'accuracy'), default='range', dest='goal', help='goal'
+        '--for',
+        choices=('range', 'time', 'accuracy'),
+        default='range',
+        dest='goal',
+        help='the goal: greatest range, longest time of flight, least distance from --target',
     )
     what.add_argument(
         '--target',
@@ -60,7 +64,7 @@ def parser() -> Parser:
         type=number(-10000.0, 10000.0, 'm'),
         default=argparse.SUPPRESS,
         metavar=('X', 'Y'),
-        help='for accuracy: where to land; from -10000 to 10000 m each',
+        help='where to land, for --for accuracy; from -10000 to 10000 m each',
     )
     text = 'free quantity and its range'
     study_flags.add_list(what, '--limit', 'NAME=LOW:HIGH', text)
@@ -71,52 +75,44 @@ def parser() -> Parser:
         type=number(1.0, 99.0, '%'),
         default=argparse.SUPPRESS,
         metavar='P',
-        help='best for this percentile of the throws instead of their mean; from 1 to 99 %%',
+        help='optimise this percentile of the throws instead of their mean; from 1 to 99 %%',
     )
     what.add_argument(
         '--count',
         type=study_flags.whole(2, 100_000),
         default=DEFAULT_COUNT,
         metavar='N',
-        help='throws of each launch under scatter or in gusts',
+        help='throws of each launch, with scatter or in gusts',
     )
-    study_flags.add_seed(what, 'of the search, the scatter and the gusts')
-    what.add_argument('--json', action='store_true', help='print one JSON document instead')
-    what.add_argument(
-        '--plot',
-        default=argparse.SUPPRESS,
-        metavar='FILE.png',
-        help='write a plot too; the name ends in .png, .svg or .pdf',
+    study_flags.add_seed(what, 'seed of the search, of the scatter and of the gusts')
+    shown = p.add_argument_group('output (default: a summary to read)')
+    shown.add_argument(
+        '--json', action='store_true', help='print one JSON document instead of the summary'
     )
+    output.add_plot(shown)
     return p
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run `optimise`; return its exit code."""
-    output.mend_streams()
-    p = parser()
+def main(arguments: Sequence[str] | None = None, prog: str = 'optimise') -> int:
+    """Run `optimise` and return its exit code: 0, 1 for a failed search, 2 for bad input."""
     words = sys.argv[1:] if arguments is None else arguments
-    chosen = p.parse_args(words)
-    try:
-        _run(chosen, words)
-    except ConfigError as error:
-        first, _, rest = error.thing.partition(' ')
-        thing = throw_flags.flag_of(error, chosen)
-        thing = _FLAG_OF.get(thing, f'{_FLAG_OF[first]} {rest}' if first in _FLAG_OF else thing)
-        p.error(str(ConfigError(thing, error.value, error.allowed)))
-    except DiscSimError as error:
-        sys.stderr.write(f'optimise: error: {error}\n')
-        return 1
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
-    return 0
+    return run_program(parser(prog), partial(_run, words=words), words, in_flags=_in_flags)
+
+
+def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
+    """Return an error that names the flag: 'limit spin' becomes '--limit spin'."""
+    first, _, rest = error.thing.partition(' ')
+    flag = throw_flags.flag_of(error, chosen)
+    flag = _FLAG_OF.get(flag, f'{_FLAG_OF[first]} {rest}' if first in _FLAG_OF else flag)
+    return ConfigError(flag, error.value, error.allowed)
 
 
 def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
-    """Return the problem that the flags pose.
+    """Return the problem that the flags describe.
 
     Raises:
-        ConfigError: They contradict each other, or are out of range.
+        UsageError: Accuracy without a target.
+        ConfigError: Flags contradict each other, or a value is out of range.
     """
     from disc_sim_ros.studies import optimise  # noqa: PLC0415 - scipy
     from disc_sim_ros.studies.flying import good_step  # noqa: PLC0415
@@ -133,6 +129,8 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
         if 'yaw' not in given:
             bearing = frames.flip(math.degrees(math.atan2(target[1], target[0])))
             limits['yaw'] = (bearing - 45.0, bearing + 45.0)
+    elif chosen.goal == optimise.ACCURACY:
+        raise UsageError('--for accuracy needs a target; give --target X Y')
     for name, span in study_flags.ranges('--limit', listed(chosen, 'limit')).items():
         if name in given:
             flag = throw_flags.FLAG_OF[name]
@@ -149,7 +147,7 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
         scatter.pop('spin', None)
     release, setup, ratio = study_flags.thrown(chosen)
     gusts = setup.wind.turbulence > 0.0
-    question = Study(
+    study = Study(
         setup=setup,
         launch=release,
         control=throw_flags.control_of(chosen),
@@ -161,7 +159,7 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
         duration=chosen.duration,
     )
     posed = optimise.Problem(
-        question=question,
+        study=study,
         limits=limits,
         goal=chosen.goal,
         target=target,
@@ -170,38 +168,36 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
     if hasattr(chosen, 'step'):
         return posed
     step = good_step(setup, posed.fastest_spin)
-    return replace(posed, question=replace(question, setup=replace(setup, step=step)))
+    return replace(posed, study=replace(study, setup=replace(setup, step=step)))
 
 
-def _run(chosen: argparse.Namespace, words: Sequence[str]) -> None:
+def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     plot = getattr(chosen, 'plot', None)
-    ending = '' if plot is None else Path(plot).suffix.removeprefix('.').lower()
     if plot is not None:
-        if ending not in PLOTS:
-            raise ConfigError('--plot', plot, 'the name must end in .png, .svg or .pdf')
-        output.check_writable('--plot', plot)
+        output.check_plot(plot)
     posed = problem(chosen, words)
     from disc_sim_ros.studies import optimise, optimise_report  # noqa: PLC0415
 
-    study_flags.note_compilation('optimise', posed.question.setup)
-    found = optimise.optimise(posed, seed=chosen.seed)
-    again = optimise_report.command(found, chosen.disc)
+    study_flags.note_compilation(chosen.prog, posed.study.setup)
+    optimum = optimise.optimise(posed, seed=chosen.seed)
+    command = optimise_report.fly_command(optimum, chosen.disc)
     if plot is not None:
-        from disc_sim_ros.analysis import plots  # noqa: PLC0415
-        from disc_sim_ros.studies.optimise_plots import figure  # noqa: PLC0415
+        from disc_sim_ros.studies.optimise_plots import figure  # noqa: PLC0415 - matplotlib
 
-        picture = plots.image(figure(found), ending)
-        output.write_whole('--plot', plot, picture)
+        output.write_plot(plot, figure(optimum))
     if chosen.json:
-        output.show(json.dumps(optimise_report.optimum_document(found, again), allow_nan=False))
-        return
-    lines = [optimise_report.text(found, again)]
+        document = optimise_report.optimum_document(optimum, command)
+        output.show(json.dumps(document, allow_nan=False))
+        return 0
+    lines = [optimise_report.optimum_text(optimum, command)]
     if plot is not None:
         lines.append(f'  wrote    {plot}')
     output.show('\n'.join(lines))
+    return 0
 
 
 def _defaults_text() -> str:
+    """Return the default limits and scatter, for the end of the help text."""
     from disc_sim_ros.studies import optimise  # noqa: PLC0415
 
     free = ', '.join(
@@ -209,9 +205,9 @@ def _defaults_text() -> str:
     )
     spread = ', '.join(f'{name} {sd:g}' for name, sd in optimise.HUMAN_SCATTER.items())
     return (
-        f'Without --limit these are free: {free}, and for accuracy the yaw within 45 degrees of '
-        f'the target. Accuracy without --scatter takes the sd {spread}. Both are choices for a '
-        'practised right-handed thrower, in m/s, degrees and rad/s.'
+        f'Free without --limit: {free}, and for accuracy the yaw within 45 degrees of the '
+        f'bearing of the target. Accuracy without --scatter uses standard deviations {spread}. '
+        'Both were chosen for a practised right-handed thrower; units are m/s, degrees and rad/s.'
     )
 
 

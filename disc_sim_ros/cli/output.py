@@ -1,5 +1,6 @@
 """What programs write: files whole or not at all, and text on stdout without tracebacks."""
 
+import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 import io
@@ -8,16 +9,54 @@ from pathlib import Path
 import signal
 import sys
 import threading
+from typing import TYPE_CHECKING
 
 from disc_sim_ros import files
 from disc_sim_ros.errors import ConfigError, DiscSimError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PLOTS = ('png', 'svg', 'pdf')
+
+
+def add_plot(group: argparse._ActionsContainer) -> None:
+    """Add the flag `--plot`."""
+    group.add_argument(
+        '--plot',
+        default=argparse.SUPPRESS,
+        metavar='FILE.png',
+        help='also write a plot; the name ends in .png, .svg or .pdf',
+    )
+
+
+def check_plot(name: str) -> None:
+    """Refuse a plot that cannot be written, before any work is done for it.
+
+    Raises:
+        ConfigError: The ending names no format, or as of `check_writable`.
+    """
+    if _ending(name) not in PLOTS:
+        raise ConfigError('--plot', name, 'the name must end in .png, .svg or .pdf')
+    check_writable('--plot', name)
+
+
+def write_plot(name: str, figure: 'Figure') -> None:
+    """Write the file of `--plot`.
+
+    Raises:
+        ConfigError: As of `write_whole`.
+    """
+    from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
+
+    write_whole('--plot', name, plots.image(figure, _ending(name)))
 
 
 def check_writable(flag: str, name: str) -> None:
     """Refuse a file that cannot be written, before any work is done for it.
 
     Raises:
-        ConfigError: It is a folder, or its folder is missing or closed.
+        ConfigError: `name` is a folder, or its folder is missing or read-only.
     """
     try:
         path = Path(name)
@@ -28,7 +67,7 @@ def check_writable(flag: str, name: str) -> None:
             raise ConfigError(flag, name, f'the folder {folder} does not exist')
         needed = [path] if path.exists() else []
         if not _is_special(path):
-            needed.append(folder)  # the new file is made there before it replaces the older
+            needed.append(folder)  # the new file is made there before it replaces the old one
         for thing in needed:
             if not os.access(thing, os.W_OK):
                 raise ConfigError(flag, name, f'no permission to write {thing}')
@@ -38,13 +77,13 @@ def check_writable(flag: str, name: str) -> None:
 
 
 def write_whole(flag: str, name: str, content: bytes) -> None:
-    """Write a file; an older one of that name stays untouched until the new one is complete.
+    """Write a file; an existing one stays untouched until the new one is complete.
 
     Raises:
-        ConfigError: The system refuses (no space, no permission, ...); the older file is whole.
+        ConfigError: The system refuses (no space, no permission, ...); the old file is unchanged.
     """
     try:
-        if _is_special(Path(name)):  # nothing to keep whole
+        if _is_special(Path(name)):  # it cannot be replaced
             Path(name).write_bytes(content)
         else:
             files.write_whole(Path(name).resolve(), content, keep_mode=True)
@@ -52,37 +91,54 @@ def write_whole(flag: str, name: str, content: bytes) -> None:
         raise ConfigError(flag, name, f'cannot write it ({error.strerror})') from None
 
 
-def show(text: str) -> None:
-    """Print text that ends the work of a program.
+class ClosedStdoutError(Exception):
+    """The reader of stdout has gone away, as `head` does when it has enough."""
 
-    A reader who has gone away, as `head` does, ends the program as SIGPIPE would.
+
+def show(text: str) -> None:
+    """Print text to stdout at once.
 
     Raises:
+        ClosedStdoutError: The reader has gone away.
+        DiscSimError: The system refuses, for instance for lack of space.
+    """
+    with _one_line_errors():
+        print(text, flush=True)
+
+
+def note(prog: str, text: str) -> None:
+    """Write one line to stderr, after the name of the program."""
+    sys.stderr.write(f'{prog}: {text}\n')
+
+
+@contextmanager
+def flushed_stdout() -> Iterator[None]:
+    """Flush stdout at the end of the block, where its errors can still be reported.
+
+    Raises:
+        ClosedStdoutError: The reader has gone away.
         DiscSimError: The system refuses, for instance for lack of space.
     """
     try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        _discard_stdout()
-        sys.exit(128 + signal.SIGPIPE)
-    except OSError as error:
-        _discard_stdout()
-        raise DiscSimError(f'cannot write to stdout ({error.strerror})') from None
+        yield
+    finally:
+        with _one_line_errors():
+            sys.stdout.flush()
 
 
 def mend_streams() -> None:
-    """Let stdout and stderr take any text, also where the caller closed them."""
+    """Make stdout and stderr accept any text, also where the caller closed them."""
     for name in ('stdout', 'stderr'):
         stream = getattr(sys, name)
         if stream is None:
-            setattr(sys, name, io.StringIO())  # nobody reads it
+            setattr(sys, name, io.StringIO())  # discarded
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
 
 
 @contextmanager
 def ended_by_ctrl_c() -> Iterator[None]:
-    """Let Ctrl-C end the program at once; compiled code does not look for it."""
+    """Let Ctrl-C end the process at once: compiled code runs no Python signal handler."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -93,11 +149,23 @@ def ended_by_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, previous)
 
 
+def _ending(name: str) -> str:
+    return Path(name).suffix.removeprefix('.').lower()
+
+
 def _is_special(path: Path) -> bool:
-    """Say whether `path` is a pipe, a terminal or another device."""
+    """Return True if `path` is a pipe, a terminal or another device."""
     return path.exists() and not path.is_file()
 
 
-def _discard_stdout() -> None:
-    """Give what is left in the buffer of stdout, which Python writes when it ends, to nobody."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+@contextmanager
+def _one_line_errors() -> Iterator[None]:
+    """Translate what the system says of stdout, and discard what is left in its buffer."""
+    try:
+        yield
+    except OSError as error:
+        # Python writes the rest of the buffer when it ends, and would fail again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            raise ClosedStdoutError from None
+        raise DiscSimError(f'cannot write to stdout ({error.strerror})') from None

@@ -1,4 +1,4 @@
-"""`paper_figures`: every figure of the paper, its numbers beside ours, and one report."""
+"""`paper_figures`: computes every figure of the paper, and compares its numbers with ours."""
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
@@ -7,7 +7,6 @@ from concurrent.futures.process import BrokenProcessPool
 import multiprocessing
 import os
 from pathlib import Path
-import signal
 import sys
 import tempfile
 import time
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
 
@@ -24,76 +24,72 @@ if TYPE_CHECKING:
 
 FORMATS = ('png', 'svg')
 PARTS = ('3', '4', '5', '6', '7', '8', '9', '10', '11', '12', 'models', 'roll_rate', 'statements')
-SLOW = {'5', '6', 'models', 'statements'}  # begun first
+SLOW = {'5', '6', 'models', 'statements'}  # started first
 MOST_JOBS = 64
 
 
-def parser() -> Parser:
+def parser(prog: str = 'paper_figures') -> Parser:
     """Return the command line of `paper_figures`."""
     p = Parser(
-        prog='paper_figures',
+        prog=prog,
         description='Compute and draw the figures of Crowther & Potts, Sports Engineering 10 '
-        "(2007) 3-21, with the paper's numbers beside ours. Writes report.html, report.md, "
-        'pictures and a CSV for each figure; units (m, s, m/s, degrees, rad/s) stand in every '
-        'axis label and CSV header. Takes less than a minute, no ROS.',
+        "(2007) 3-21, and compare the paper's numbers with ours. Writes report.html, report.md, "
+        'and pictures and a CSV file for each figure; every axis label and CSV header states its '
+        'unit (m, s, m/s, degrees, rad/s). Takes less than a minute; needs no ROS.',
     )
+    p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    text = 'folder to write to, made if it is not there; only files of these names are overwritten'
+    text = 'folder to write to; it is made if it does not exist, and files of the same names are '
+    text += 'overwritten'
     p.add_argument('--out', default='paper_figures', metavar='DIR', help=text)
     p.add_argument(
         '--only',
         type=_list_of(PARTS),
         default=PARTS,
         metavar='PARTS',
-        help=f'comma-separated, from {", ".join(PARTS)} (default: all)',
+        help=f'comma-separated list of {", ".join(PARTS)} (default: all)',
     )
     p.add_argument(
         '--formats',
         type=_list_of(FORMATS),
         default=FORMATS,
         metavar='KINDS',
-        help='comma-separated, from png, svg (default: both)',
+        help='comma-separated list of png, svg (default: both)',
     )
-    text = "draw each picture for a dark background too; the report follows the reader's setting"
+    text = "also draw each picture for a dark background; the report follows the reader's setting"
     p.add_argument('--dark', action=argparse.BooleanOptionalAction, default=True, help=text)
     jobs = min(2, os.cpu_count() or 1)
-    text = f'processes at a time, a whole number from 1 to {MOST_JOBS}'
+    text = f'parallel processes, a whole number from 1 to {MOST_JOBS}'
     p.add_argument('--jobs', type=_jobs, default=jobs, metavar='N', help=text)
     return p
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run `paper_figures`; return its exit code: 0, 1 if it failed, 2 for bad input."""
-    output.mend_streams()
-    p = parser()
-    chosen = p.parse_args(arguments)
+def main(arguments: Sequence[str] | None = None, prog: str = 'paper_figures') -> int:
+    """Run `paper_figures` and return its exit code: 0, 1 for a failure, 2 for bad input."""
+    return run_program(parser(prog), _run, arguments)
+
+
+def _run(chosen: argparse.Namespace) -> int:
+    folder = writable_folder(chosen.out)
     try:
-        _run(chosen)
-    except ConfigError as error:
-        p.error(str(error))
-    except (DiscSimError, BrokenProcessPool) as error:
-        sys.stderr.write(f'paper_figures: error: {error}\n')
-        return 1
+        _write_all(chosen, folder)
+    except BrokenProcessPool as error:
+        raise DiscSimError(str(error)) from error
     except OSError as error:
-        what = error.strerror or str(error)
-        sys.stderr.write(f'paper_figures: error: cannot write to {chosen.out} ({what})\n')
-        return 1
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
+        reason = error.strerror or str(error)
+        raise DiscSimError(f'cannot write to {chosen.out} ({reason})') from error
     return 0
 
 
-def _run(chosen: argparse.Namespace) -> None:
+def _write_all(chosen: argparse.Namespace, folder: Path) -> None:
+    """Write every chosen part and the report."""
     started = time.perf_counter()
-    folder = made(chosen.out)
-    # Not before the arguments are known to be good: matplotlib and scipy take a second.
+    # Imported once the arguments are known to be right: matplotlib and scipy take a second.
     from disc_sim_ros.paper import run  # noqa: PLC0415
 
     if not flight.is_ready():
-        sys.stderr.write(
-            'paper_figures: note: compiling the equations of motion, once on this machine, about '
-            '10 s\n'
-        )
+        text = 'compiling the equations of motion, once on this machine, about 10 s'
+        output.note(chosen.prog, f'note: {text}')
         with output.ended_by_ctrl_c():
             _compile()
     total = len(chosen.only)
@@ -102,17 +98,17 @@ def _run(chosen: argparse.Namespace) -> None:
     for one in _parts(chosen, folder):
         done.append(one)
         output.show(f'[{len(done):2d}/{total}] {one.title}, {one.seconds:.1f} s')
-    found = run.write_report(done, folder, dark=chosen.dark)
-    output.show('\n'.join(found.summary()))
+    report = run.write_report(done, folder, dark=chosen.dark)
+    output.show('\n'.join(report.summary()))
     seconds = time.perf_counter() - started
     output.show(f'wrote {folder / "report.html"} and {folder / "report.md"} in {seconds:.0f} s')
 
 
-def made(name: str) -> Path:
-    """Return the folder to write to, made if need be.
+def writable_folder(name: str) -> Path:
+    """Return the folder to write to; make it if it does not exist.
 
     Raises:
-        ConfigError: It is no folder, or nothing can be written in it.
+        ConfigError: `name` is not a folder, or files cannot be written in it.
     """
     folder = Path(name)
     try:
@@ -120,7 +116,7 @@ def made(name: str) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except FileExistsError:
-        raise ConfigError('--out', name, 'it is not a folder; give a folder') from None
+        raise ConfigError('--out', name, 'this is not a folder; give a folder') from None
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         reason = getattr(error, 'strerror', None) or str(error)
         raise ConfigError('--out', name, f'cannot write there ({reason})') from None
@@ -128,7 +124,7 @@ def made(name: str) -> Path:
 
 
 def _parts(chosen: argparse.Namespace, folder: Path) -> Iterator['Done']:
-    """Yield the parts as they get done."""
+    """Yield the parts as they are finished."""
     from disc_sim_ros.paper import run  # noqa: PLC0415
     from disc_sim_ros.studies import executors  # noqa: PLC0415
 

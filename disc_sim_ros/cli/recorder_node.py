@@ -1,28 +1,32 @@
-"""`recorder_node`: the node of `disc_sim_ros.ros.recorder.node`."""
+"""`recorder_node`: the executable of the node in `disc_sim_ros.ros.recorder.node`."""
 
-import os
-import signal
+from collections.abc import Sequence
 import sys
 
-USAGE = """\
-usage: recorder_node [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r __ns:=NAMESPACE]...]
+from disc_sim_ros.cli.main import run_node
 
-Record every topic into an MCAP bag that `ros2 bag`, Foxglove and analyse_bag read, until Ctrl-C.
+USAGE = """\
+usage: {prog} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r __ns:=NAMESPACE]...]
+
+Record every topic until Ctrl-C into an MCAP bag that `ros2 bag`, Foxglove and analyse_bag read.
   -p bag:=my_flight                        the folder to make (bags/disc_DATE_TIME)
-  -p topics:="['/odom', '/configuration']" these topics only
-  -p exclude:='/rosout|/parameter_events'  all but these
-  -p max_size_mib:=512                     a new file of the bag after 512 MiB
+  -p topics:="['/odom', '/configuration']" only these topics
+  -p exclude:='/rosout|/parameter_events'  all topics except these
+  -p max_size_mib:=512                     start a new file of the bag after 512 MiB
 Services: ~/pause, ~/resume, ~/split, ~/flush. Parameters are in docs/recorder.md.
 """
 
 
-def main() -> int:
-    """Run the node; Ctrl-C and SIGTERM end it with code 0, also while Python still loads it."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os._exit(0))
-    if {'-h', '--help'} & set(sys.argv[1:]):
-        sys.stdout.write(USAGE)
-        return 0
+def main(arguments: Sequence[str] | None = None, prog: str = 'recorder_node') -> int:
+    """Run the node and return its exit code."""
+    return run_node(USAGE, _start, arguments, prog)
+
+
+def _start(words: list[str]) -> int:
     from disc_sim_ros.ros.recorder import node  # noqa: PLC0415 - takes a second
 
-    return node.main()
+    return node.main(words)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,27 +1,32 @@
-"""`sim_node`: the node of `disc_sim_ros.ros.sim.node`."""
+"""`sim_node`: the executable of the node in `disc_sim_ros.ros.sim.node`."""
 
-import os
-import signal
+from collections.abc import Sequence
 import sys
 
-USAGE = """\
-usage: sim_node [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r FROM:=TO]...]
+from disc_sim_ros.cli.main import run_node
 
-Fly the disc in real time on ROS 2, and throw it at once (-p auto_throw:=false waits for ~/throw).
+USAGE = """\
+usage: {prog} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r FROM:=TO]...]
+
+Simulate the flight of a disc in real time on ROS 2. The disc is thrown at the start;
+with -p auto_throw:=false the node waits for a call of ~/throw.
   -p launch.speed:=20.0 -p disc:=wraith    another throw, another disc
-  -r __ns:=/red -p frame_prefix:=red/      a disc of its own namespace
+  -r __ns:=/red -p frame_prefix:=red/      a second disc, in a namespace of its own
   --params-file sim.yaml                   all parameters; config/sim.yaml explains each
 Topics and services are in docs/topics.md, parameters in docs/parameters.md.
 """
 
 
-def main() -> int:
-    """Run the node; Ctrl-C and SIGTERM end it with code 0, also while Python still loads it."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os._exit(0))
-    if {'-h', '--help'} & set(sys.argv[1:]):
-        sys.stdout.write(USAGE)
-        return 0
+def main(arguments: Sequence[str] | None = None, prog: str = 'sim_node') -> int:
+    """Run the node and return its exit code."""
+    return run_node(USAGE, _start, arguments, prog)
+
+
+def _start(words: list[str]) -> int:
     from disc_sim_ros.ros.sim import node  # noqa: PLC0415 - takes a second
 
-    return node.main()
+    return node.main(words)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

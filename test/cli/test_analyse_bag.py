@@ -1,4 +1,4 @@
-"""`analyse_bag` as its users meet it: bags of sim_node, damaged ones, and bags of others."""
+"""`analyse_bag` as a command: bags of sim_node, damaged bags, and bags of other programs."""
 
 import json
 import math
@@ -71,7 +71,7 @@ def parabola_bag(tmp_path, **changes):
 # ---- bags of sim_node ----
 
 
-def test_a_steered_flight_in_gusts_is_flown_again_to_the_bit(document, steered):
+def test_a_steered_flight_in_gusts_is_computed_again_to_the_bit(document, steered):
     code, found = document(steered, '--verify')
     assert code == 0
     (disc,) = found['discs']
@@ -101,7 +101,7 @@ def test_a_steered_flight_in_gusts_is_flown_again_to_the_bit(document, steered):
 def test_a_bag_that_ends_between_the_landing_and_the_message_that_shows_it(
     document, tmp_path, capsys
 ):
-    """A recorder that is ended at the event may be quicker than the simulator."""
+    """A recorder that ends at the landing event may miss the odometry that follows."""
     pytest.importorskip('rclpy')
     from analysis.bags import copy
 
@@ -118,7 +118,7 @@ def test_a_bag_that_ends_between_the_landing_and_the_message_that_shows_it(
     assert again['largest_difference']['landed.flight_time_s'] == 0.0
 
 
-def test_what_it_says_is_what_fly_says(document, capsys, tmp_path):
+def test_it_agrees_with_fly(document, capsys, tmp_path):
     pytest.importorskip('rclpy')
     text = '--disc wraith --speed 22 --pitch 8 --spin 90 --height 1.2 --control 0 0.004 0'
     flags = text.split()
@@ -139,7 +139,7 @@ def test_what_it_says_is_what_fly_says(document, capsys, tmp_path):
         assert flight['launch'][key] == pytest.approx(flown['launch'][key], abs=1e-12), key
 
 
-def test_without_a_command_it_differs_and_says_since_when(analyse, document, part):
+def test_a_bag_without_a_command_differs_from_a_known_time_on(analyse, document, part):
     bag = part(lambda m: m.topic != '/applied_coefficients', custom_data={'drops': '/odom 3'})
     code, found = document(bag, '--verify')
     assert code == analyse_bag.DIFFERENT == 3
@@ -157,7 +157,7 @@ def test_without_a_command_it_differs_and_says_since_when(analyse, document, par
     assert analyse(bag)[0] == 0  # without --verify nothing is judged
 
 
-def test_lost_odometry_is_counted_and_does_no_harm(document, part):
+def test_lost_odometry_is_counted_and_the_flight_still_verified(document, part):
     lost = iter(range(10_000))
     bag = part(lambda m: m.topic != '/odom' or next(lost) not in {40, 41, 60})
     code, found = document(bag, '--verify')
@@ -167,7 +167,7 @@ def test_lost_odometry_is_counted_and_does_no_harm(document, part):
     assert messages['longest_gap_s'] == pytest.approx(3 / 150, abs=1e-8)
 
 
-def test_a_bag_that_begins_in_flight_says_what_it_lacks(document, part):
+def test_a_bag_that_begins_in_flight_is_reported_with_its_gap(document, part):
     from analysis import bags
 
     begin = bags.START + 400 * bags.MS
@@ -184,7 +184,7 @@ def test_a_bag_that_begins_in_flight_says_what_it_lacks(document, part):
     assert 'the bag begins 0.29' in doubt
 
 
-def test_a_change_of_the_profile_of_the_wind_is_named(document, tmp_path):
+def test_a_change_of_the_wind_profile_is_named(document, tmp_path):
     pytest.importorskip('rclpy')
     from rcl_interfaces.msg import Parameter, ParameterEvent
     from rclpy.serialization import serialize_message
@@ -213,7 +213,7 @@ def test_a_change_of_the_profile_of_the_wind_is_named(document, tmp_path):
     assert any('profile of the wind was changed' in doubt for doubt in again['doubts'])
 
 
-def test_topics_that_were_not_recorded_are_named(document, part, steered, tmp_path):
+def test_topics_missing_in_the_bag_are_named(document, part, steered, tmp_path):
     from disc_sim_ros.bags.reader import open_bag
     from disc_sim_ros.bags.writer import BagWriter
 
@@ -229,17 +229,17 @@ def test_topics_that_were_not_recorded_are_named(document, part, steered, tmp_pa
     assert 'not recorded: applied_moment, applied_coefficients, applied_wind' in doubts
 
 
-def test_an_unfinished_bag_is_read_and_called_so(analyse, steered, tmp_path):
+def test_an_unfinished_bag_is_read_with_a_note(analyse, steered, tmp_path):
     shutil.copytree(steered, tmp_path / 'steered')
     file = tmp_path / 'steered' / 'steered_0.mcap'
     file.write_bytes(file.read_bytes()[:-2000])  # in the index
     code, out, err = analyse(tmp_path / 'steered', '--verify')
     assert code == 0
-    assert re.fullmatch(r'analyse_bag: note: \S+ was not ended.*`repair_bag`.*\n', err)
+    assert re.fullmatch(r'analyse_bag: note: \S+ was not closed.*`repair_bag`.*\n', err)
     assert 'identical to the last bit' in out
 
 
-def test_two_discs_of_one_topic_have_a_report_each(document, analyse, tmp_path):
+def test_two_discs_on_one_topic_have_a_report_each(document, analyse, tmp_path):
     pytest.importorskip('rclpy')
     from analysis import bags
     from disc_sim_ros.bags.writer import BagWriter
@@ -272,10 +272,10 @@ def test_two_discs_of_one_topic_have_a_report_each(document, analyse, tmp_path):
     assert 'choose from red, blue' in err
 
 
-# ---- bags of others ----
+# ---- bags of other programs ----
 
 
-def test_a_bag_of_others_is_measured_and_its_kinematics_checked(document, tmp_path):
+def test_a_bag_of_another_program_is_measured_and_its_kinematics_checked(document, tmp_path):
     parabola = Parabola()
     code, found = document(parabola_bag(tmp_path), '--verify')
     assert code == 0
@@ -301,14 +301,14 @@ def test_a_bag_of_others_is_measured_and_its_kinematics_checked(document, tmp_pa
     }
 
 
-def test_a_twist_in_the_wrong_frame_is_found(analyse, tmp_path):
+def test_a_twist_in_the_wrong_frame_is_reported(analyse, tmp_path):
     code, out, _ = analyse(parabola_bag(tmp_path, in_map=True), '--verify')
     assert code == 3
     assert 'velocity: WRONG' in out
     assert 'it is given in map' in out
 
 
-def test_topics_that_only_have_the_names_of_ours_do_no_harm(document, tmp_path):
+def test_topics_with_our_names_and_other_contents_are_tolerated(document, tmp_path):
     texts = ['disc: 3', '[1, 2]', '{', 'disc: a\nmodel: b\nrelease: {X: 1}\nwind: {}']
     bag = foreign.write(
         tmp_path / 'bag',
@@ -325,7 +325,7 @@ def test_topics_that_only_have_the_names_of_ours_do_no_harm(document, tmp_path):
     assert 'no configuration' in flight['verification']['not_flown_again']
 
 
-def test_numbers_that_are_none_do_no_harm(document, tmp_path):
+def test_nan_in_a_message_is_tolerated(document, tmp_path):
     parabola = Parabola()
     parabola.position[40] = np.nan
     bag = foreign.write(tmp_path / 'bag', {'/odom': parabola.odometry()})
@@ -333,10 +333,10 @@ def test_numbers_that_are_none_do_no_harm(document, tmp_path):
     assert [f['ended'] for f in found['discs'][0]['flights']] == ['rest', 'end of the bag']
 
 
-# ---- what it writes and refuses ----
+# ---- output and refusals ----
 
 
-def test_the_plot_is_a_picture_and_nothing_without_a_flight(analyse, steered, tmp_path):
+def test_the_plot_is_a_picture_and_needs_a_flight(analyse, steered, tmp_path):
     code, out, err = analyse(steered, '--plot', tmp_path / 'flight.png')
     assert (code, err) == (0, '')
     assert f'wrote {tmp_path}/flight.png' in out
@@ -351,7 +351,7 @@ def test_the_plot_is_a_picture_and_nothing_without_a_flight(analyse, steered, tm
     assert 'no flight' in out
     code, _, err = analyse(bag, '--plot', tmp_path / 'none.png')
     assert code == 1
-    assert 'nothing flies' in err
+    assert 'no flight to plot' in err
     assert not (tmp_path / 'none.png').exists()
 
 
@@ -363,7 +363,7 @@ def refused(result, *fragments):
         assert fragment in err
 
 
-def test_what_is_no_bag_of_motion_is_refused_in_one_line(analyse, tmp_path):
+def test_input_without_motion_is_refused_in_one_line(analyse, tmp_path):
     refused(analyse(tmp_path / 'nothing'), 'no such bag')
     (tmp_path / 'folder').mkdir()
     refused(analyse(tmp_path / 'folder'), 'no bag')
@@ -380,7 +380,7 @@ def test_what_is_no_bag_of_motion_is_refused_in_one_line(analyse, tmp_path):
     refused(analyse(), 'BAG')
 
 
-def test_help_tells_units_and_needs_no_ros():
+def test_help_states_units_and_needs_no_ros():
     code = "import sys; sys.modules['rclpy'] = None; from disc_sim_ros.cli.analyse_bag import main"
     result = subprocess.run(
         [sys.executable, '-c', f'{code}; main(["--help"])'],

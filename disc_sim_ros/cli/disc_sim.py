@@ -1,0 +1,122 @@
+"""`disc-sim`: every program of this package under one name, for a PATH that has another `fly`."""
+
+import argparse
+from collections.abc import Callable, Sequence
+import sys
+from typing import Protocol
+
+from disc_sim_ros import __version__
+from disc_sim_ros.cli import output
+from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.main import run_program
+
+
+class Program(Protocol):
+    """The `main` of a program."""
+
+    def __call__(self, arguments: Sequence[str] | None = None, prog: str = ...) -> int:
+        """Run the program under the name `prog` and return its exit code."""
+
+
+# Each is imported when it is called: `fly` alone takes a quarter of a second.
+def _fly() -> Program:
+    from disc_sim_ros.cli import fly  # noqa: PLC0415
+
+    return fly.main
+
+
+def _sweep() -> Program:
+    from disc_sim_ros.cli import sweep  # noqa: PLC0415
+
+    return sweep.main
+
+
+def _optimise() -> Program:
+    from disc_sim_ros.cli import optimise  # noqa: PLC0415
+
+    return optimise.main
+
+
+def _demo() -> Program:
+    from disc_sim_ros.cli import demo  # noqa: PLC0415
+
+    return demo.main
+
+
+def _analyse_bag() -> Program:
+    from disc_sim_ros.cli import analyse_bag  # noqa: PLC0415
+
+    return analyse_bag.main
+
+
+def _repair_bag() -> Program:
+    from disc_sim_ros.cli import repair_bag  # noqa: PLC0415
+
+    return repair_bag.main
+
+
+def _paper_figures() -> Program:
+    from disc_sim_ros.cli import paper_figures  # noqa: PLC0415
+
+    return paper_figures.main
+
+
+def _sim_node() -> Program:
+    from disc_sim_ros.cli import sim_node  # noqa: PLC0415
+
+    return sim_node.main
+
+
+def _recorder_node() -> Program:
+    from disc_sim_ros.cli import recorder_node  # noqa: PLC0415
+
+    return recorder_node.main
+
+
+PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
+    'fly': (_fly, 'compute one flight: summary, JSON, CSV, plot or bag'),
+    'sweep': (_sweep, 'compute grids and random ensembles of flights into one file'),
+    'optimise': (_optimise, 'find the launch with the best range, time or accuracy'),
+    'demo': (_demo, 'throw in real time, record and analyse the flight (ROS 2)'),
+    'sim_node': (_sim_node, 'run the simulator node (ROS 2)'),
+    'recorder_node': (_recorder_node, 'run the recorder node (ROS 2)'),
+    'analyse_bag': (_analyse_bag, 'summarise, verify or plot the flights in a bag'),
+    'repair_bag': (_repair_bag, 'copy what a damaged bag still holds into a complete one'),
+    'paper_figures': (_paper_figures, 'compute the figures of Crowther & Potts (2007)'),
+}
+
+
+def parser() -> Parser:
+    """Return the command line of `disc-sim` up to the name of a program."""
+    width = max(map(len, PROGRAMS))
+    lines = (f'  {name:{width}}  {line}' for name, (_, line) in PROGRAMS.items())
+    p = Parser(
+        prog='disc-sim',
+        usage='disc-sim [-h] [--version] PROGRAM ...',
+        description='Simulate the flight of spin-stabilised discs. `disc-sim PROGRAM --help`\n'
+        'explains a program; each program is also an executable of its own name.',
+        epilog='\n'.join(['programs:', *lines]),
+    )
+    p.formatter_class = argparse.RawDescriptionHelpFormatter
+    p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    p.add_argument('PROGRAM', nargs='?', choices=tuple(PROGRAMS), help=argparse.SUPPRESS)
+    return p
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program that the first word names and return its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words and words[0] in PROGRAMS:
+        load, _ = PROGRAMS[words[0]]
+        return load()(words[1:], f'disc-sim {words[0]}')
+    p = parser()
+
+    def show_help(_: argparse.Namespace) -> int:
+        output.show(p.format_help().rstrip())
+        return 0
+
+    return run_program(p, show_help, words)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
