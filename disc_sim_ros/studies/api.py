@@ -1,4 +1,4 @@
-"""All that a script about ensembles needs, under one roof; docs/sweep.md has examples."""
+"""The names that a script about ensembles of flights needs; docs/sweep.md has examples."""
 
 from disc_sim_ros.studies.executors import opened
 from disc_sim_ros.studies.flying import good_step

@@ -15,20 +15,20 @@ from disc_sim_ros.errors import ConfigError, DiscSimError
 
 THREADS, PROCESSES, DASK = 'threads', 'processes', 'dask'
 MOST_WORKERS = 1024
-_PATIENCE = 10.0  # s to wait for a scheduler of Dask to answer
+_PATIENCE = 10.0  # s, longest wait for an answer of a Dask scheduler
 
 
 @contextmanager
 def opened(name: str, workers: int | None = None) -> Iterator[tuple[Executor | None, int]]:
-    """Yield an executor for `run.sweep` and its number of workers.
+    """Yield an executor for `runner.sweep` and its number of workers.
 
     Args:
-        name: 'threads' (of this process: no executor), 'processes', 'dask' (a cluster of this
-            machine for as long as it takes) or 'dask=ADDRESS' (a scheduler that runs already).
-        workers: Threads or processes; None for as many as there are cores. Not for an address.
+        name: 'threads' (of this process: no executor), 'processes', 'dask' (a temporary cluster
+            on this machine) or 'dask=ADDRESS' (a running scheduler).
+        workers: Threads or processes; None for one per core. Has no effect with an address.
 
     Raises:
-        ConfigError: An unknown name, or nothing answers at the address.
+        ConfigError: An unknown name, or no scheduler answers at the address.
         DiscSimError: Dask is not installed.
     """
     kind, has_address, address = name.partition('=')
@@ -43,14 +43,14 @@ def opened(name: str, workers: int | None = None) -> Iterator[tuple[Executor | N
         with processes(wanted) as pool:
             yield pool, wanted
     else:
-        with _dask(name, address, wanted) as (pool, found):
-            yield pool, found
+        with _dask(name, address, wanted) as (pool, available):
+            yield pool, available
 
 
 @contextmanager
 def processes(workers: int) -> Iterator[Executor]:
-    """Yield an executor of fresh processes, which leave Ctrl-C to this one and end with it."""
-    # Fresh: a copy of this process could not use numba's threads and locks.
+    """Yield an executor of new processes, which ignore Ctrl-C and end with this process."""
+    # Not forked: a forked process cannot use the threads and locks of numba.
     context = multiprocessing.get_context('spawn')
     pool = _Processes(workers, mp_context=context, initializer=_begin_worker)
     try:
@@ -60,10 +60,10 @@ def processes(workers: int) -> Iterator[Executor]:
 
 
 class _Processes(ProcessPoolExecutor):
-    """Starts its processes with SIGINT held: none dies of Ctrl-C before `_begin_worker`."""
+    """Starts its processes with SIGINT blocked: Ctrl-C cannot end one before `_begin_worker`."""
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        resource_tracker.ensure_running()  # starting it lets go of what is held
+        resource_tracker.ensure_running()  # it would unblock SIGINT when it starts
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             return super().submit(function, *args, **kwargs)
@@ -72,7 +72,7 @@ class _Processes(ProcessPoolExecutor):
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it, however it ends."""
+    """Ignore Ctrl-C, and end when the parent process ends, even if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     parent = multiprocessing.parent_process()
@@ -106,5 +106,5 @@ def _dask(name: str, address: str, workers: int) -> Iterator[tuple[Executor, int
             reason = (str(error).splitlines() or [type(error).__name__])[0]
             allowed = f'no scheduler answers there ({reason})'
             raise ConfigError('executor', name, allowed) from None
-        found = sum(client.nthreads().values())
-        yield stack.enter_context(client.get_executor()), found or workers
+        available = sum(client.nthreads().values())
+        yield stack.enter_context(client.get_executor()), available or workers

@@ -1,4 +1,4 @@
-"""One batch of an ensemble: what every worker does."""
+"""Flies one batch of a study: the work of every worker."""
 
 import numpy as np
 
@@ -10,48 +10,48 @@ from disc_sim_ros.studies.study import Study
 from disc_sim_ros.studies.tables import Columns
 
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)  # s
-TURN = 1.3  # rad of nutation in a step
+TURN = 1.3  # rad, greatest nutation angle per step
 
 
 def good_step(setup: Setup, spin: float) -> float:
-    """Return the longest of `STEPS` that follows the nutation of a disc.
+    """Return the longest of `STEPS` that resolves the nutation of a disc [s].
 
-    A turn of less than 1.3 rad in a step leaves landings right to 1 mm.
+    With a nutation of less than 1.3 rad per step landings are accurate to 1 mm.
 
     Args:
-        setup: Of the disc.
-        spin: The fastest [rad/s].
+        setup: The setup with the disc.
+        spin: The greatest spin [rad/s].
     """
     nutation = abs(spin) * setup.disc.inertia_axial / setup.disc.inertia_diametral
     return next((step for step in STEPS if step * nutation < TURN), STEPS[-1])
 
 
-def fly_batch(question: Study, start: int, stop: int, threads: int | None) -> Columns:
-    """Fly the flights `start` to `stop` of a question.
+def fly_batch(study: Study, start: int, stop: int, threads: int | None) -> Columns:
+    """Fly the flights `start` to `stop` of a study.
 
     Args:
-        question: What is flown.
+        study: The flights.
         start: First flight.
         stop: The flight after the last.
-        threads: Threads to fly in; None for one a core.
+        threads: Threads to use; None for one per core.
 
     Returns:
-        Columns of shape (stop - start,): what differs, and how the flights ended, under names
-        with units.
+        Columns of shape (stop - start,), named with units: the quantities that differ, and the
+        state at the end of each flight.
     """
-    values = question.values(start, stop)
-    seeds = question.gust_seeds(start, stop)
+    values = study.values(start, stop)
+    seeds = study.gust_seeds(start, stop)
     ended = fly_many(
-        kernel_values(question, values),
-        question.setup,
-        control=question.control,
+        kernel_values(study, values),
+        study.setup,
+        control=study.control,
         seeds=seeds,
-        duration=question.duration,
-        ground=question.ground,
+        duration=study.duration,
+        ground=study.ground,
         threads=threads,
     )
     columns: Columns = {'index': np.arange(start, stop)}
-    columns |= {q.key: values[q.name] for q in question.varied}
+    columns |= {q.key: values[q.name] for q in study.varied}
     if seeds is not None:
         columns['gust_seed'] = seeds
     return columns | {
@@ -68,13 +68,13 @@ def fly_batch(question: Study, start: int, stop: int, threads: int | None) -> Co
     }
 
 
-def kernel_values(question: Study, values: dict[str, FloatArray]) -> dict[str, float | FloatArray]:
-    """Return what `fly_many` takes: every value that differs, and the fixed ones of a throw."""
-    found: dict[str, float | FloatArray] = {
-        name: question.fixed(name) for name in (*LAUNCH, *WIND, *CONTROL)
+def kernel_values(study: Study, values: dict[str, FloatArray]) -> dict[str, float | FloatArray]:
+    """Return the arguments of `fly_many`: the quantities that differ, and the fixed ones."""
+    arguments: dict[str, float | FloatArray] = {
+        name: study.fixed(name) for name in (*LAUNCH, *WIND, *CONTROL)
     }
-    found |= values
-    ratio = found.pop(ADVANCE_RATIO, question.advance_ratio)
+    arguments |= values
+    ratio = arguments.pop(ADVANCE_RATIO, study.advance_ratio)
     if ratio is not None:
-        found['spin'] = 2.0 * found['speed'] * ratio / question.setup.disc.diameter
-    return found
+        arguments['spin'] = 2.0 * arguments['speed'] * ratio / study.setup.disc.diameter
+    return arguments

@@ -1,4 +1,4 @@
-"""The launch that reaches furthest, flies longest or hits best, also under human scatter."""
+"""Search of the launch with the best range, time of flight or accuracy, also under scatter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,32 +22,32 @@ from disc_sim_ros.studies.study import Study
 
 RANGE, TIME, ACCURACY = 'range', 'time', 'accuracy'
 GOALS = (RANGE, TIME, ACCURACY)
-_WORST = 1e6  # of a flight that was lost
-_POPULATION = 12  # launches for each free quantity
+_WORST = 1e6  # m, distance of a flight that was lost
+_POPULATION = 12  # launches per free quantity
 _GENERATIONS, _TOLERANCE = 150, 1e-5  # of the global search
-_FEW = 16  # samples of the scatter in the global search, which then is shorter
-_GENERATIONS_OF_SCATTER, _TOLERANCE_OF_SCATTER = 60, 1e-3
+_FEW = 16  # samples of the scatter in the global search
+_GENERATIONS_OF_SCATTER, _TOLERANCE_OF_SCATTER = 60, 1e-3  # of the global search
 _ON_LINES = 128  # samples of the scatter along the lines through the optimum
 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """What is to be made best, of what, within which limits.
+    """A goal, the free quantities with their limits, and everything that is fixed.
 
     Attributes:
-        question: What is fixed, and how throws scatter around each launch: `Normal` without a
-            mean, `count` samples. No grid.
+        study: The fixed quantities, and the scatter of throws around each launch: only `Normal`
+            without a mean, `count` samples, no grid.
         limits: Least and greatest value of each free quantity.
         goal: 'range', 'time' or 'accuracy'.
         target: x, y in `map` [m], for accuracy.
-        percentile: Of the results under scatter, instead of their mean, or None. Of 10 the range
-            that nine of ten throws exceed, or the distance from the target that one of ten keeps.
+        percentile: Percentile of the results to optimise instead of their mean, or None. With 10,
+            nine of ten throws exceed the range, or one of ten is closer to the target.
 
     Raises:
-        ConfigError: Something contradicts something else.
+        ConfigError: A value is out of range, or two of them contradict each other.
     """
 
-    question: Study
+    study: Study
     limits: Mapping[str, tuple[float, float]]
     goal: str = RANGE
     target: tuple[float, float] | None = None
@@ -56,27 +56,27 @@ class Problem:
     def __post_init__(self) -> None:
         validation.choice('goal', self.goal, GOALS)
         if (self.goal == ACCURACY) != (self.target is not None):
-            text = 'accuracy needs a target' if self.target is None else 'only accuracy has one'
+            text = 'accuracy needs a target' if self.target is None else 'only accuracy takes one'
             raise ConfigError('target', self.target, text)
         if not self.limits:
-            raise ConfigError('limits', 'nothing', 'at least one quantity must be free')
+            raise ConfigError('limits', {}, 'at least one quantity must be free')
         for name, (low, high) in self.limits.items():
             if name not in {*LAUNCH, ADVANCE_RATIO}:
-                allowed = f'a launch has {", ".join(LAUNCH)} and {ADVANCE_RATIO}'
+                allowed = f'free may be {", ".join(LAUNCH)} and {ADVANCE_RATIO}'
                 raise ConfigError(f'limit {name}', 'free', allowed)
-            lowest, highest = self.question.bounds(quantity('limits', name).name)
+            lowest, highest = self.study.bounds(quantity('limits', name).name)
             if not lowest <= low < high <= highest:
-                allowed = f'from {lowest:g} to {highest:g}, the lower first and less'
+                allowed = f'from {lowest:g} to {highest:g}, the lower limit first'
                 raise ConfigError(f'limit {name}', [low, high], allowed)
-        for name, law in self.question.scatter.items():
+        for name, law in self.study.scatter.items():
             if not isinstance(law, Normal) or law.mean is not None:
-                raise ConfigError(f'scatter {name}', str(law), 'give a standard deviation alone')
+                raise ConfigError(f'scatter {name}', str(law), 'give a standard deviation only')
         if self.percentile is not None:
             validation.number('percentile', self.percentile, 1.0, 99.0)
             if not self.scatters:
-                raise ConfigError('percentile', self.percentile, 'nothing scatters')
-        if 'spin' in self.limits and self.question.advance_ratio is not None:
-            raise ConfigError('limit spin', 'free', 'the advance ratio gives it')
+                raise ConfigError('percentile', self.percentile, 'no quantity scatters')
+        if 'spin' in self.limits and self.study.advance_ratio is not None:
+            raise ConfigError('limit spin', 'free', 'the advance ratio determines it')
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -85,88 +85,88 @@ class Problem:
 
     @property
     def fastest_spin(self) -> float:
-        """Return the greatest spin that a launch within the limits can have [rad/s]."""
-        question = self.question
-        law = question.scatter.get('spin')
+        """Return the greatest spin within the limits [rad/s]; normal scatter counts to 6 sd."""
+        study = self.study
+        law = study.scatter.get('spin')
         wide = 6.0 * law.sd if isinstance(law, Normal) else 0.0
-        if ADVANCE_RATIO in self.limits or question.advance_ratio is not None:
-            ratio = max(map(abs, self.limits.get(ADVANCE_RATIO, (question.advance_ratio or 0,))))
-            speed = max(map(abs, self.limits.get('speed', (question.fixed('speed'),))))
-            return 2.0 * speed * ratio / question.setup.disc.diameter
-        return max(map(abs, self.limits.get('spin', (question.fixed('spin'),)))) + wide
+        if ADVANCE_RATIO in self.limits or study.advance_ratio is not None:
+            ratio = max(map(abs, self.limits.get(ADVANCE_RATIO, (study.advance_ratio or 0,))))
+            speed = max(map(abs, self.limits.get('speed', (study.fixed('speed'),))))
+            return 2.0 * speed * ratio / study.setup.disc.diameter
+        return max(map(abs, self.limits.get('spin', (study.fixed('spin'),)))) + wide
 
     @property
     def scatters(self) -> bool:
-        """Say whether throws of one launch differ."""
-        return bool(self.question.scatter) or self.question.gusts_differ
+        """Return True if throws of one launch differ."""
+        return bool(self.study.scatter) or self.study.gusts_differ
 
     @cached_property
     def fixed_target(self) -> tuple[float, float]:
-        """Return the target, or the origin where there is none."""
+        """Return the target, or the origin without a target."""
         return self.target or (0.0, 0.0)
 
     def landings(self, launches: FloatArray, samples: int) -> Landings:
-        """Fly the scatter of each launch.
+        """Fly several throws of each launch.
 
         Args:
             launches: Values of the free quantities, shape (n, free).
-            samples: Throws of each; the same scatter for each launch.
+            samples: Throws of each launch; each launch has the same scatter.
 
         Returns:
-            n x samples flights, those of one launch together.
+            n x samples flights, all throws of a launch one after the other.
         """
-        question = self.question
+        study = self.study
         n = len(launches)
         values: dict[str, FloatArray] = {
             name: np.repeat(launches[:, j], samples) for j, name in enumerate(self.free)
         }
-        if question.scatter:
-            scores = np.tile(question.scores(0, samples), (n, 1))
-            for j, (name, law) in enumerate(question.scatter.items()):
-                centre = values.get(name, question.fixed(name))
-                values[name] = quantiles(law, scores[:, j], centre, *question.bounds(name))
-        seeds = question.gust_seeds(0, samples)
+        if study.scatter:
+            scores = np.tile(study.scores(0, samples), (n, 1))
+            for j, (name, law) in enumerate(study.scatter.items()):
+                centre = values.get(name, study.fixed(name))
+                values[name] = quantiles(law, scores[:, j], centre, *study.bounds(name))
+        seeds = study.gust_seeds(0, samples)
         return fly_many(
-            kernel_values(question, values),
-            question.setup,
-            control=question.control,
+            kernel_values(study, values),
+            study.setup,
+            control=study.control,
             seeds=None if seeds is None else np.tile(seeds, n),
-            duration=question.duration,
+            duration=study.duration,
         )
 
     def results(self, ended: Landings) -> FloatArray:
-        """Return what the goal is about of each flight: range [m], time [s] or distance [m]."""
+        """Return the result of each flight: range [m], time [s] or distance to the target [m]."""
         if self.goal == ACCURACY:
             x, y = self.fixed_target
-            found = np.hypot(ended.x - x, ended.y - y)
-            return np.where(ended.status == LOST, _WORST, found)
-        found = ended.range if self.goal == RANGE else ended.time
-        return np.where(ended.status == LOST, 0.0, found)
+            distance = np.hypot(ended.x - x, ended.y - y)
+            return np.where(ended.status == LOST, _WORST, distance)
+        result = ended.range if self.goal == RANGE else ended.time
+        return np.where(ended.status == LOST, 0.0, result)
 
     def values(self, launches: FloatArray, samples: int) -> FloatArray:
         """Return the mean or the percentile of the results of each launch, shape (n,)."""
         samples = samples if self.scatters else 1
-        found = self.results(self.landings(launches, samples)).reshape(len(launches), samples)
+        results = self.results(self.landings(launches, samples)).reshape(len(launches), samples)
         if self.percentile is None:
-            mean: FloatArray = found.mean(axis=1)
+            mean: FloatArray = results.mean(axis=1)
             return mean
-        percentile: FloatArray = np.percentile(found, self.percentile, axis=1)
+        percentile: FloatArray = np.percentile(results, self.percentile, axis=1)
         return percentile
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best launch that was found.
+    """The best launch of a search.
 
     Attributes:
-        problem: What was searched.
-        launch: Values of the free quantities, rounded to what `fly` is told.
-        value: Mean or percentile of the results, of all samples.
+        problem: The problem.
+        launch: Values of the free quantities, rounded as in the command that repeats the flight.
+        value: Mean or percentile of the results of all samples.
         results: Results of the samples, shape (samples,).
-        flat: Of each free quantity the range around the optimum in which the value stays within
-            `slack`, the others unchanged.
-        at_limit: Free quantities that a limit holds.
-        launches: Launches that were tried.
+        flat: For each free quantity, the range around the optimum in which the value stays within
+            `slack` while the others do not change.
+        at_limit: Free quantities whose optimum is at a limit.
+        launches: Number of launches that the search evaluated.
     """
 
     problem: Problem
@@ -179,39 +179,39 @@ class Optimum:
 
     @property
     def slack(self) -> float:
-        """Return how much worse still counts as flat: 1 %, for accuracy 5 cm at least."""
+        """Return the greatest loss that counts as flat: 1 %, but for accuracy at least 5 cm."""
         return slack(self.problem, self.value)
 
     @property
-    def question(self) -> Study:
-        """Return the question with this launch, to fly its scatter."""
-        return at(self.problem.question, self.launch)
+    def study(self) -> Study:
+        """Return the study of throws with this launch."""
+        return at(self.problem.study, self.launch)
 
 
 def optimise(problem: Problem, seed: int = 0) -> Optimum:
     """Return the best launch: differential evolution over the limits, then a simplex search.
 
-    The same problem and seed give the same launch. Differential evolution may miss a narrow best;
-    another seed tells.
+    The same problem and seed give the same launch. Differential evolution may miss a narrow
+    optimum; repeat the search with another seed to check.
 
     Args:
-        problem: What to make best.
-        seed: Of the search.
+        problem: The problem.
+        seed: Seed of the search.
 
     Source: Storn & Price, J. of Global Optimization 11 (1997) 341-359; Nelder & Mead, Computer J.
-    7 (1965) 308-313; both of scipy.
+    7 (1965) 308-313; both as implemented in scipy.
     """
     sign = 1.0 if problem.goal == ACCURACY else -1.0
     low, high = np.array(list(problem.limits.values())).T
-    samples = problem.question.count
-    tried = 0
+    samples = problem.study.count
+    evaluated = 0
 
     def cost(unit: FloatArray, few: int) -> FloatArray:
-        nonlocal tried
-        tried += len(unit)
+        nonlocal evaluated
+        evaluated += len(unit)
         return sign * problem.values(low + np.clip(unit, 0.0, 1.0) * (high - low), few)
 
-    found = optimize.differential_evolution(
+    best = optimize.differential_evolution(
         lambda x: cost(x.T if x.ndim > 1 else x[None], min(samples, _FEW)),
         [(0.0, 1.0)] * len(low),
         vectorized=True,
@@ -222,58 +222,56 @@ def optimise(problem: Problem, seed: int = 0) -> Optimum:
         tol=_TOLERANCE_OF_SCATTER if problem.scatters else _TOLERANCE,
         polish=False,
         **_seeded(seed),
-    )
-    best = found.x
-    for width in (0.05, 0.005):  # again from the best: a simplex can collapse
+    ).x
+    for width in (0.05, 0.005):  # twice, because a simplex can collapse
         simplex = np.clip(best + width * np.vstack([np.zeros(len(low)), np.eye(len(low))]), 0, 1)
         turned = np.where(best + width > 1.0, best - width, simplex.max(axis=0))
         for j in range(len(low)):
             simplex[j + 1, j] = turned[j]
-        found = optimize.minimize(
+        best = optimize.minimize(
             lambda x: cost(x[None], samples)[0],
             best,
             method='Nelder-Mead',
             bounds=[(0.0, 1.0)] * len(low),
             options={'initial_simplex': simplex, 'xatol': 1e-5, 'fatol': 1e-7, 'maxfev': 200},
-        )
-        best = found.x
+        ).x
     launch = {
         name: _rounded(value, *problem.limits[name])
         for name, value in zip(problem.free, low + best * (high - low), strict=True)
     }
-    return _described(problem, launch, tried)
+    return _described(problem, launch, evaluated)
 
 
-def at(question: Study, launch: Mapping[str, float]) -> Study:
-    """Return a question whose throws have the launch: fields of Launch, or an advance ratio."""
+def at(study: Study, launch: Mapping[str, float]) -> Study:
+    """Return a study with another launch: fields of Launch, or an advance ratio."""
     fields = {name: value for name, value in launch.items() if name in LAUNCH}
-    ratio = launch.get(ADVANCE_RATIO, question.advance_ratio)
-    return replace(question, launch=replace(question.launch, **fields), advance_ratio=ratio)
+    ratio = launch.get(ADVANCE_RATIO, study.advance_ratio)
+    return replace(study, launch=replace(study.launch, **fields), advance_ratio=ratio)
 
 
 def slack(problem: Problem, value: float) -> float:
-    """Return how much worse than `value` still counts as flat."""
+    """Return the loss against `value` that still counts as flat."""
     return max(0.01 * value, 0.05) if problem.goal == ACCURACY else 0.01 * value
 
 
 def lines(
     problem: Problem, launch: Mapping[str, float], points: int = 161
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return the value along each free quantity, the others as in `launch`: x and value."""
-    found = {}
+    """Return x and value along each free quantity, with the others as in `launch`."""
+    curves = {}
     centre = np.array([launch[name] for name in problem.free])
     for j, (name, (low, high)) in enumerate(problem.limits.items()):
         x = np.unique(np.append(np.linspace(low, high, points), centre[j]))
         launches = np.tile(centre, (len(x), 1))
         launches[:, j] = x
-        samples = min(problem.question.count, _ON_LINES)
-        found[name] = (x, problem.values(launches, samples))
-    return found
+        samples = min(problem.study.count, _ON_LINES)
+        curves[name] = (x, problem.values(launches, samples))
+    return curves
 
 
-def _described(problem: Problem, launch: dict[str, float], tried: int) -> Optimum:
+def _described(problem: Problem, launch: dict[str, float], evaluated: int) -> Optimum:
     centre = np.array([[launch[name] for name in problem.free]])
-    samples = problem.question.count if problem.scatters else 1
+    samples = problem.study.count if problem.scatters else 1
     results = problem.results(problem.landings(centre, samples))
     value = float(problem.values(centre, samples)[0])
     flat = {}
@@ -291,17 +289,17 @@ def _described(problem: Problem, launch: dict[str, float], tried: int) -> Optimu
         for name, (low, high) in problem.limits.items()
         if min(launch[name] - low, high - launch[name]) <= 1e-3 * (high - low)
     )
-    return Optimum(problem, launch, value, results, flat, at_limit, tried)
+    return Optimum(problem, launch, value, results, flat, at_limit, evaluated)
 
 
 def _rounded(value: float, low: float, high: float) -> float:
-    """Return a value with the digits that a thrower could ever mean, within the limits."""
+    """Return a value rounded to 1e-4 of its limits or finer, within the limits."""
     digits = max(0, 4 - math.floor(math.log10(high - low)))
     return float(min(max(round(float(value), digits), low), high))
 
 
 def _seeded(seed: int) -> dict[str, Any]:
-    """Return the seed under the name that this scipy knows."""
+    """Return the seed as the argument that the installed scipy takes."""
     known = inspect.signature(optimize.differential_evolution).parameters
     return {'rng' if 'rng' in known else 'seed': np.random.default_rng(seed)}
 

@@ -1,4 +1,4 @@
-"""Plot of an optimum: its flight, and how fast the result falls off around it."""
+"""Plot of an optimum: its flight, and the result along each free quantity."""
 
 import math
 
@@ -9,18 +9,18 @@ import numpy as np
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.studies.columns import quantity
 from disc_sim_ros.studies.optimise import Optimum, lines
-from disc_sim_ros.studies.optimise_report import WHAT, statistic_of, still_flight, told
+from disc_sim_ros.studies.optimise_report import WHAT, named_value, statistic_of, still_flight
 
 BLUE, ORANGE = '#0072b2', '#d55e00'  # Okabe and Ito: safe for every eye
 
 
 def figure(optimum: Optimum) -> Figure:
-    """Return the flight of an optimum, and how the value falls off along each free quantity."""
+    """Return a plot of the flight of an optimum, and of the result along each free quantity."""
     problem = optimum.problem
     what, unit = WHAT[problem.goal]
-    found = lines(problem, optimum.launch)
-    columns = max(2, min(3, len(found)))
-    rows = 1 + math.ceil(len(found) / columns)
+    curves = lines(problem, optimum.launch)
+    columns = max(2, min(3, len(curves)))
+    rows = 1 + math.ceil(len(curves) / columns)
     page = Figure(figsize=(12, 3.6 * rows), layout='constrained')
     FigureCanvasAgg(page)
     grid = page.add_gridspec(rows, 2 * columns)
@@ -39,7 +39,7 @@ def figure(optimum: Optimum) -> Figure:
         axis.set_aspect('equal', adjustable='datalim')
         axis.grid(alpha=0.3)
         axis.legend(loc='best', fontsize=9)
-    for k, (name, (at, values)) in enumerate(found.items()):
+    for k, (name, (at, values)) in enumerate(curves.items()):
         column = 2 * (k % columns)
         axis = page.add_subplot(grid[1 + k // columns, column : column + 2])
         axis.plot(at, values, color=BLUE)
@@ -51,14 +51,14 @@ def figure(optimum: Optimum) -> Figure:
         axis.grid(alpha=0.3)
         axis.legend(loc='best', fontsize=9)
     aim = f' at {problem.target[0]:g}, {problem.target[1]:g} m' if problem.target else ''
-    launch = ', '.join(told(name, value) for name, value in optimum.launch.items())
+    launch = ', '.join(named_value(name, value) for name, value in optimum.launch.items())
     page.suptitle(
-        f'{problem.question.setup.disc.name}, best {problem.goal}{aim}: {launch}',
+        f'{problem.study.setup.disc.name}, best {problem.goal}{aim}: {launch}',
         fontsize=11,
-        parse_math=False,  # a file may have dollars in its name
+        parse_math=False,  # the name of a disc file may contain dollars
     )
     return page
 
 
 def _dots(optimum: Optimum) -> int:
-    return min(optimum.problem.question.count, 2000)
+    return min(optimum.problem.study.count, 2000)

@@ -1,4 +1,4 @@
-"""An optimum as lines to read and as a document."""
+"""An optimum as text, as a JSON document, and as the `fly` command that repeats it."""
 
 from dataclasses import replace
 import math
@@ -19,42 +19,42 @@ WHAT = {'range': ('range', 'm'), 'time': ('time of flight', 's'),
 _FLAGS = {'angle_of_attack': '--alpha'}
 
 
-def still_launch(question: Study) -> Launch:
-    """Return the launch of a question, with the spin of its advance ratio."""
-    launch, ratio = question.launch, question.advance_ratio
+def still_launch(study: Study) -> Launch:
+    """Return the launch of a study without scatter; its spin follows from the advance ratio."""
+    launch, ratio = study.launch, study.advance_ratio
     if ratio is None:
         return launch
-    spin = theory.spin_rate(ratio, question.setup.disc.diameter, launch.speed)
+    spin = theory.spin_rate(ratio, study.setup.disc.diameter, launch.speed)
     return replace(launch, spin=spin)
 
 
 def still_flight(optimum: Optimum, sample_rate: float = 0.0) -> Flight:
-    """Return the flight of the optimum itself, without scatter, as `fly` flies it."""
-    question = optimum.question
+    """Return the flight of an optimum without scatter, as `fly` computes it."""
+    study = optimum.study
     return fly(
-        still_launch(question),
-        question.setup,
-        control=question.control,
-        duration=question.duration,
+        still_launch(study),
+        study.setup,
+        control=study.control,
+        duration=study.duration,
         sample_rate=sample_rate,
     )
 
 
-def text(optimum: Optimum, command: str) -> str:
-    """Return an optimum in a few lines.
+def optimum_text(optimum: Optimum, command: str) -> str:
+    """Return an optimum as a few lines of text.
 
     Args:
-        optimum: What was found.
-        command: The line that flies it again.
+        optimum: The optimum.
+        command: The command that repeats its flight.
     """
     problem, flight = optimum.problem, still_flight(optimum)
     what, unit = WHAT[problem.goal]
     aim = 'least' if problem.goal == ACCURACY else 'greatest'
     statistic = statistic_of(optimum)
-    values = ', '.join(told(name, value) for name, value in optimum.launch.items())
+    values = ', '.join(named_value(name, value) for name, value in optimum.launch.items())
     x, y, _ = flight.position
-    found = [
-        f'{problem.question.setup.disc.name}: {aim} {statistic}{what}',
+    lines = [
+        f'{problem.study.setup.disc.name}: {aim} {statistic}{what}',
         f'  launch   {values}',
         f'  flight   {flight.range:.2f} m, x {x:.2f}, y {y:.2f} m, in {flight.time:.2f} s, apex '
         f'{flight.apex:.2f} m'
@@ -63,11 +63,11 @@ def text(optimum: Optimum, command: str) -> str:
     if problem.scatters:
         spread = ', '.join(
             f'{name} ± {law.sd:g} {quantity("", name).short_unit}'
-            for name, law in problem.question.scatter.items()
+            for name, law in problem.study.scatter.items()
             if hasattr(law, 'sd')
         )
         r = optimum.results
-        found += [
+        lines += [
             f'  scatter  {spread or "gusts"}: {len(r)} throws',
             f'  result   {what}: mean {r.mean():.2f}, sd {r.std(ddof=1):.2f}, 10 % below '
             f'{np.percentile(r, 10):.2f}, 90 % below {np.percentile(r, 90):.2f} {unit}',
@@ -75,15 +75,15 @@ def text(optimum: Optimum, command: str) -> str:
     flat = ', '.join(
         f'{name} {low:.4g} to {high:.4g}' for name, (low, high) in optimum.flat.items()
     )
-    found.append(f'  flat     {slack(problem, optimum.value):.2g} {unit} worse at most: {flat}')
+    lines.append(f'  flat     {slack(problem, optimum.value):.2g} {unit} worse at most: {flat}')
     if optimum.at_limit:
-        found.append(f'  limits   hold {" and ".join(optimum.at_limit)}')
-    found += [f'  tried    {optimum.launches} launches', f'  again    {command}']
-    return '\n'.join(found)
+        lines.append(f'  limits   hold {" and ".join(optimum.at_limit)}')
+    lines += [f'  tried    {optimum.launches} launches', f'  again    {command}']
+    return '\n'.join(lines)
 
 
 def optimum_document(optimum: Optimum, command: str) -> dict[str, Any]:
-    """Return an optimum as values that JSON knows; keys carry units."""
+    """Return an optimum as values for JSON; keys carry units."""
     problem, flight = optimum.problem, still_flight(optimum)
     r = optimum.results
     return {
@@ -107,19 +107,19 @@ def optimum_document(optimum: Optimum, command: str) -> dict[str, Any]:
         'at_limit': list(optimum.at_limit),
         'launches_tried': optimum.launches,
         'command': command,
-        'question': study_document(optimum.question),
+        'question': study_document(optimum.study),  # this key is as in 0.1: programs read it
     }
 
 
-def command(optimum: Optimum, disc: str) -> str:
-    """Return the `fly` command that flies an optimum again, without scatter.
+def fly_command(optimum: Optimum, disc: str) -> str:
+    """Return the `fly` command that repeats the flight of an optimum, without scatter.
 
     Args:
-        optimum: What was found.
-        disc: Name or file of the disc, as `fly --disc` takes it.
+        optimum: The optimum.
+        disc: Name or file of the disc, as for `fly --disc`.
     """
-    question = optimum.question
-    setup, usual = question.setup, Setup(disc=question.setup.disc)
+    study = optimum.study
+    setup, usual = study.setup, Setup(disc=study.setup.disc)
     words = ['fly']
 
     def add(flag: str, *values: object, default: object = None) -> None:
@@ -131,12 +131,12 @@ def command(optimum: Optimum, disc: str) -> str:
     add('--disc', disc, default='frisbee')
     for name in ('model', 'aero', 'moment_axes'):
         add(f'--{name.replace("_", "-")}', getattr(setup, name), default=getattr(usual, name))
-    release = still_launch(question)
+    release = still_launch(study)
     for name in LAUNCH:
         flag = _FLAGS.get(name, f'--{name.replace("_", "-")}')
         add(flag, getattr(release, name), default=getattr(Launch(), name))
     for flag, names in (('--control', CONTROL), ('--wind', WIND)):
-        values = [question.fixed(name) + 0.0 for name in names]
+        values = [study.fixed(name) + 0.0 for name in names]
         if any(values):
             add(flag, *values)
     if setup.wind.turbulence > 0.0:
@@ -145,7 +145,7 @@ def command(optimum: Optimum, disc: str) -> str:
     add('--air-density', setup.air.density, default=usual.air.density)
     add('--gravity', setup.air.gravity, default=usual.air.gravity)
     add('--step', setup.step, default=usual.step)
-    add('--duration', question.duration, default=60.0)
+    add('--duration', study.duration, default=60.0)
     return shlex.join(words)
 
 
@@ -155,14 +155,14 @@ def _miss(optimum: Optimum, flight: Flight) -> float:
 
 
 def statistic_of(optimum: Optimum) -> str:
-    """Return what of the throws is best, to go before the name of the result."""
+    """Return the optimised statistic of the throws, as words before the name of the result."""
     if not optimum.problem.scatters:
         return ''
     percentile = optimum.problem.percentile
     return 'mean ' if percentile is None else f'{percentile:g} % percentile of the '
 
 
-def told(name: str, value: float) -> str:
+def named_value(name: str, value: float) -> str:
     """Return a value with its name and unit."""
     q = quantity('', name)
     return f'{name.replace("_", " ")} {value:.6g} {q.short_unit}'.strip().replace(' °', '°')

@@ -1,4 +1,4 @@
-"""Plots of ensembles: landings with their ellipses, curves, maps and sensitivities."""
+"""Plots of studies: landings with their ellipses, curves, maps and sensitivities."""
 
 from pathlib import Path
 
@@ -11,26 +11,33 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.studies import report, tables
 from disc_sim_ros.studies.columns import RESULTS, quantity
-from disc_sim_ros.studies.summary import ANSWERS, ELLIPSES, Ellipse, Summary, good_status, radius2
+from disc_sim_ros.studies.summary import (
+    ELLIPSES,
+    MAIN_RESULTS,
+    Ellipse,
+    Summary,
+    expected_status,
+    radius2,
+)
 
 BLUE, ORANGE, GREEN = '#0072b2', '#d55e00', '#009e73'  # Okabe and Ito: safe for every eye
 _COLOURS = {'range_m': BLUE, 'drift_m': ORANGE, 'time_s': GREEN}
-_MOST_DOTS = 5000  # landings that are drawn one by one
-_CELLS = 120  # of a density, along its longer side
+_MOST_DOTS = 5000  # landings drawn one by one; more are drawn as a density
+_CELLS = 120  # of the density, along its longer side
 _MOST_BARS = 12
 
 
 def figure(flights: Path | tables.Columns, summary: Summary) -> Figure:
-    """Return the plot that suits the question.
+    """Return the plot of a study.
 
-    Landings and sensitivities of scatter; curves of a grid of one quantity; maps of one of two;
-    of more, the best over all others for each quantity.
+    Without a grid: landings and sensitivities. With a grid of one quantity: curves; of two: maps;
+    of more: for each quantity the best result over all others.
 
     Args:
-        flights: What `run.sweep` wrote or `run.collect` returned.
-        summary: Its summary.
+        flights: File of `runner.sweep`, or columns of `runner.collect`.
+        summary: Summary of the flights.
     """
-    dimensions = len(summary.question.vary)
+    dimensions = len(summary.study.vary)
     page = Figure(figsize=(12, 6.5), layout='constrained')
     FigureCanvasAgg(page)
     if dimensions == 0 or summary.grid is None:
@@ -47,9 +54,9 @@ def figure(flights: Path | tables.Columns, summary: Summary) -> Figure:
     else:
         _best_curves(page, summary)
     page.suptitle(
-        f'{report.headline(summary)}\n{report.study_text(summary.question)}',
+        f'{report.headline(summary)}\n{report.study_text(summary.study)}',
         fontsize=11,
-        parse_math=False,  # a file may have dollars in its name
+        parse_math=False,  # the name of a disc file may contain dollars
     )
     return page
 
@@ -59,16 +66,16 @@ def _landings(axis: Axes, flights: Path | tables.Columns, summary: Summary) -> N
     axis.set_aspect('equal', adjustable='datalim')
     axis.grid(alpha=0.3)
     axis.plot(0, 0, 'k^', label='release')
-    good = good_status(summary.question)
+    expected = expected_status(summary.study)
     chunks = (
         tables.chunks(flights, ['status', 'x_m', 'y_m'])
         if isinstance(flights, Path)
         else iter([flights])
     )
-    landed = summary.counts['landed' if summary.question.ground else 'flying']
+    landed = summary.counts['landed' if summary.study.ground else 'flying']
     if landed <= _MOST_DOTS:
         for chunk in chunks:
-            chosen = chunk['status'] == good
+            chosen = chunk['status'] == expected
             axis.plot(chunk['x_m'][chosen], chunk['y_m'][chosen], '.', color=BLUE, ms=3, alpha=0.5)
     else:
         x, y = summary.spreads['x_m'], summary.spreads['y_m']
@@ -77,14 +84,14 @@ def _landings(axis: Axes, flights: Path | tables.Columns, summary: Summary) -> N
         y_edges = np.arange(y.least, y.greatest + 2 * size, size)
         density = np.zeros((len(x_edges) - 1, len(y_edges) - 1))
         for chunk in chunks:
-            chosen = chunk['status'] == good
+            chosen = chunk['status'] == expected
             density += np.histogram2d(
                 chunk['x_m'][chosen], chunk['y_m'][chosen], (x_edges, y_edges)
             )[0]
         shown = np.ma.masked_equal(density.T / size**2, 0.0)
         mesh = axis.pcolormesh(x_edges, y_edges, shown, cmap='Blues', norm=LogNorm())
         axis.figure.colorbar(mesh, ax=axis, label='landings per m²', shrink=0.8)
-    if summary.ellipse is not None and summary.question.count > 1:
+    if summary.ellipse is not None and summary.study.count > 1:
         _ellipses(axis, summary.ellipse)
     axis.legend(loc='best', fontsize=9)
 
@@ -96,22 +103,22 @@ def _ellipses(axis: Axes, ellipse: Ellipse) -> None:
     shape = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)
     for percent, line in zip(ELLIPSES, ('-', '--', ':'), strict=True):
         x, y = np.array(ellipse.centre)[:, None] + np.sqrt(radius2(percent)) * shape
-        share = f'{percent} % ellipse, {ellipse.inside[percent]:.1%} in it'
+        share = f'{percent} % ellipse, {ellipse.inside[percent]:.1%} inside'
         axis.plot(x, y, color=ORANGE, ls=line, lw=1.6, label=share)
     axis.plot(*ellipse.centre, '+', color=ORANGE, ms=10, mew=2)
 
 
 def _sensitivities(axis: Axes, summary: Summary) -> None:
-    """Draw standardised regression coefficients, the strongest on top."""
+    """Draw standardised regression coefficients, the largest on top."""
     names = list(dict.fromkeys(s.quantity for s in summary.sensitivities))
-    found = {(s.quantity, s.answer): s.correlation for s in summary.sensitivities}
-    names.sort(key=lambda name: max(abs(found.get((name, a), 0.0)) for a in ANSWERS))
+    bars = {(s.quantity, s.result): s.correlation for s in summary.sensitivities}
+    names.sort(key=lambda name: max(abs(bars.get((name, r), 0.0)) for r in MAIN_RESULTS))
     names = names[-_MOST_BARS:]
     place = np.arange(len(names))
-    for k, answer in enumerate(ANSWERS):
-        lengths = [found.get((name, answer), 0.0) for name in names]
-        label = f'{answer.rpartition("_")[0]}, R² {summary.explained.get(answer, 0.0):.2f}'
-        axis.barh(place + 0.26 * (1 - k), lengths, 0.24, color=_COLOURS[answer], label=label)
+    for k, result in enumerate(MAIN_RESULTS):
+        lengths = [bars.get((name, result), 0.0) for name in names]
+        label = f'{result.rpartition("_")[0]}, R² {summary.explained.get(result, 0.0):.2f}'
+        axis.barh(place + 0.26 * (1 - k), lengths, 0.24, color=_COLOURS[result], label=label)
     axis.set_yticks(place, [name.replace('_', ' ') for name in names])
     axis.axvline(0.0, color='black', lw=0.8)
     axis.set(xlabel='sd of the result per sd of the quantity (linear regression)')
@@ -120,38 +127,39 @@ def _sensitivities(axis: Axes, summary: Summary) -> None:
 
 
 def _curves(page: Figure, summary: Summary) -> None:
-    ((name, values),) = summary.question.vary.items()
+    ((name, values),) = summary.study.vary.items()
     mean, sd = _grid(summary)
     order = np.argsort(values)
     x = np.asarray(values, dtype=float)[order]
-    for axis, (j, answer) in zip(
-        page.subplots(len(ANSWERS), 1, sharex=True), enumerate(ANSWERS), strict=True
+    for axis, (j, result) in zip(
+        page.subplots(len(MAIN_RESULTS), 1, sharex=True), enumerate(MAIN_RESULTS), strict=True
     ):
-        colour, y, width = _COLOURS[answer], mean[order, j], sd[order, j]
+        colour, y, width = _COLOURS[result], mean[order, j], sd[order, j]
         marker = '.' if len(x) <= 60 else ''
         axis.plot(x, y, marker=marker, color=colour, label='mean')
-        if summary.question.count > 1:
+        if summary.study.count > 1:
             axis.fill_between(x, y - width, y + width, color=colour, alpha=0.25, label='± 1 sd')
             axis.legend(loc='best', fontsize=9)
-        axis.set_ylabel(RESULTS[answer])
+        axis.set_ylabel(RESULTS[result])
         axis.grid(alpha=0.3)
     axis.set_xlabel(quantity('name', name).label)
 
 
 def _maps(page: Figure, summary: Summary) -> None:
-    (x_name, x), (y_name, y) = summary.question.vary.items()
+    (x_name, x), (y_name, y) = summary.study.vary.items()
     mean, _ = _grid(summary)
     x_order, y_order = np.argsort(x), np.argsort(y)
-    for axis, answer in zip(page.subplots(1, 2), ('range_m', 'time_s'), strict=True):
-        found = mean[:, ANSWERS.index(answer)].reshape(len(x), len(y))[np.ix_(x_order, y_order)].T
+    for axis, result in zip(page.subplots(1, 2), ('range_m', 'time_s'), strict=True):
+        column = mean[:, MAIN_RESULTS.index(result)].reshape(len(x), len(y))
+        values = column[np.ix_(x_order, y_order)].T
         x_line, y_line = np.asarray(x)[x_order], np.asarray(y)[y_order]
-        mesh = axis.pcolormesh(x_line, y_line, found, cmap='viridis', shading='nearest')
-        if min(found.shape) > 2 and np.nanmin(found) < np.nanmax(found):
-            lines = axis.contour(x_line, y_line, found, 8, colors='white', linewidths=0.8)
+        mesh = axis.pcolormesh(x_line, y_line, values, cmap='viridis', shading='nearest')
+        if min(values.shape) > 2 and np.nanmin(values) < np.nanmax(values):
+            lines = axis.contour(x_line, y_line, values, 8, colors='white', linewidths=0.8)
             axis.clabel(lines, fontsize=8)
-        axis.figure.colorbar(mesh, ax=axis, label=RESULTS[answer])
-        best = next(b for b in summary.best if b.answer == answer)
-        label = f'best, {best.mean:.2f} {answer.rpartition("_")[2]}'
+        axis.figure.colorbar(mesh, ax=axis, label=RESULTS[result])
+        best = next(b for b in summary.best if b.result == result)
+        label = f'best, {best.mean:.2f} {result.rpartition("_")[2]}'
         axis.plot(
             best.values[x_name], best.values[y_name], '*', ms=14, mfc=ORANGE, mec='white',
             label=label, clip_on=False,
@@ -161,19 +169,19 @@ def _maps(page: Figure, summary: Summary) -> None:
 
 
 def _best_curves(page: Figure, summary: Summary) -> None:
-    """Draw for each quantity the best that all others allow."""
-    question = summary.question
-    mean = _grid(summary)[0].reshape((*question.shape, len(ANSWERS)))
-    axes = page.subplots(2, len(question.shape), squeeze=False, sharey='row')
-    for row, answer in zip(axes, ('range_m', 'time_s'), strict=True):
-        row[0].set_ylabel(f'greatest {RESULTS[answer]}')
-        best = next(b for b in summary.best if b.answer == answer)
-        for i, (name, values) in enumerate(question.vary.items()):
-            others = tuple(k for k in range(len(question.shape)) if k != i)
-            top = np.nanmax(mean[..., ANSWERS.index(answer)], axis=others)
+    """Draw for each quantity the best mean result over all other quantities."""
+    study = summary.study
+    mean = _grid(summary)[0].reshape((*study.shape, len(MAIN_RESULTS)))
+    axes = page.subplots(2, len(study.shape), squeeze=False, sharey='row')
+    for row, result in zip(axes, ('range_m', 'time_s'), strict=True):
+        row[0].set_ylabel(f'greatest {RESULTS[result]}')
+        best = next(b for b in summary.best if b.result == result)
+        for i, (name, values) in enumerate(study.vary.items()):
+            others = tuple(k for k in range(len(study.shape)) if k != i)
+            top = np.nanmax(mean[..., MAIN_RESULTS.index(result)], axis=others)
             order = np.argsort(values)
             x = np.asarray(values)[order]
-            row[i].plot(x, top[order], marker='.', color=_COLOURS[answer])
+            row[i].plot(x, top[order], marker='.', color=_COLOURS[result])
             row[i].plot(best.values[name], best.mean, '*', ms=13, color=ORANGE, label='best')
             row[i].set_xlabel(quantity('name', name).label)
             row[i].grid(alpha=0.3)
@@ -181,7 +189,7 @@ def _best_curves(page: Figure, summary: Summary) -> None:
 
 
 def _grid(summary: Summary) -> tuple[FloatArray, FloatArray]:
-    """Return mean and standard deviation of `ANSWERS` at each point, shape (points, 3)."""
+    """Return mean and standard deviation of `MAIN_RESULTS` at each point, shape (points, 3)."""
     if summary.grid is None:
-        raise ValueError('a plot of a grid needs one')
+        raise ValueError('the summary has no grid')
     return summary.grid.mean, np.sqrt(np.nan_to_num(summary.grid.variance))

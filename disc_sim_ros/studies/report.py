@@ -1,6 +1,5 @@
-"""The summary of an ensemble as lines to read and as a document for programs."""
+"""The summary of a study as text and as a JSON document."""
 
-from dataclasses import asdict
 import math
 from typing import Any
 
@@ -8,71 +7,71 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.studies.columns import WIND, quantity
 from disc_sim_ros.studies.scatter import Normal
 from disc_sim_ros.studies.study import Study, study_document
-from disc_sim_ros.studies.summary import ANSWERS, ELLIPSES, Ellipse, Summary
+from disc_sim_ros.studies.summary import ELLIPSES, MAIN_RESULTS, Ellipse, Summary
 
 _ONE = {'degrees': 'degree'}
 _SHOWN = ('range_m', 'drift_m', 'time_s', 'apex_m')
 
 
 def summary_text(summary: Summary) -> str:
-    """Return a summary in a screen of lines."""
+    """Return a summary as text that fits on one screen."""
     lines = [headline(summary)]
     lines += _spread_lines(summary)
-    question = summary.question
-    if question.count > 1 and not question.vary and summary.ellipse is not None:
+    study = summary.study
+    if study.count > 1 and not study.vary and summary.ellipse is not None:
         lines += _ellipse_lines(summary.ellipse)
     for best in summary.best:
-        what = {'range_m': 'furthest', 'time_s': 'longest'}[best.answer]
+        what = {'range_m': 'furthest', 'time_s': 'longest'}[best.result]
         where = ', '.join(_value(name, value) for name, value in best.values.items())
-        sd = f', sd {best.sd:.2f}' if question.count > 1 else ''
-        unit = best.answer.rpartition('_')[2]
+        sd = f', sd {best.sd:.2f}' if study.count > 1 else ''
+        unit = best.result.rpartition('_')[2]
         lines.append(f'  {what:9}{best.mean:.2f} {unit}{sd} at {where}')
     lines += _sensitivity_lines(summary)
     return '\n'.join(lines)
 
 
 def headline(summary: Summary) -> str:
-    """Return what was flown and how it ended, in one line."""
-    question, counts = summary.question, summary.counts
-    made = []
-    if question.vary:
-        sizes = ' x '.join(str(n) for n in question.shape)
-        made.append(f'grid of {sizes} points' if len(question.shape) > 1 else f'{sizes} points')
-    if question.count > 1:
-        made.append(f'{question.count} samples{" each" if question.vary else ""}')
-    ends = {'landed': 'landed', 'flying': 'still in the air', 'lost': 'lost'}
-    told = [f'{counts[end]} {text}' for end, text in ends.items() if counts[end]]
-    flown = f'{question.setup.disc.name}: {question.size} flights ({", ".join(made)})'
-    return f'{flown}: {", ".join(told)}'
+    """Return one line: the disc, the number of flights, and how they ended."""
+    study, counts = summary.study, summary.counts
+    design = []
+    if study.vary:
+        sizes = ' x '.join(str(n) for n in study.shape)
+        design.append(f'grid of {sizes} points' if len(study.shape) > 1 else f'{sizes} points')
+    if study.count > 1:
+        design.append(f'{study.count} samples{" each" if study.vary else ""}')
+    words = {'landed': 'landed', 'flying': 'still in the air', 'lost': 'lost'}
+    ends = [f'{counts[status]} {text}' for status, text in words.items() if counts[status]]
+    flights = f'{study.setup.disc.name}: {study.size} flights ({", ".join(design)})'
+    return f'{flights}: {", ".join(ends)}'
 
 
-def study_text(question: Study) -> str:
-    """Return what differs from flight to flight, in one line."""
-    found = []
-    for name, values in question.vary.items():
-        sd = question.scatter.get(name)
+def study_text(study: Study) -> str:
+    """Return one line: the quantities that differ from flight to flight, and the wind."""
+    parts = []
+    for name, values in study.vary.items():
+        sd = study.scatter.get(name)
         around = f', each ± {sd.sd:g}' if isinstance(sd, Normal) else ''
-        found.append(_told(name, f'{values[0]:g} to {values[-1]:g}{around}'))
-    for name, law in question.scatter.items():
+        parts.append(_with_unit(name, f'{values[0]:g} to {values[-1]:g}{around}'))
+    for name, law in study.scatter.items():
         if isinstance(law, Normal):
-            if name not in question.vary:
-                found.append(_told(name, f'{_mean(question, name, law):g} ± {law.sd:g}'))
+            if name not in study.vary:
+                parts.append(_with_unit(name, f'{_mean(study, name, law):g} ± {law.sd:g}'))
         else:
-            found.append(_told(name, f'{law.low:g} to {law.high:g}'))
-    wind = [question.fixed(name) for name in WIND]
+            parts.append(_with_unit(name, f'{law.low:g} to {law.high:g}'))
+    wind = [study.fixed(name) for name in WIND]
     if any(wind):
-        found.append('wind {:g} {:g} {:g} m/s'.format(*wind))
-    if question.setup.wind.turbulence:
-        found.append(f'gusts of {question.setup.wind.turbulence:g} m/s')
-    return '; '.join(found)
+        parts.append('wind {:g} {:g} {:g} m/s'.format(*wind))
+    if study.setup.wind.turbulence:
+        parts.append(f'gusts of {study.setup.wind.turbulence:g} m/s')
+    return '; '.join(parts)
 
 
 def summary_document(summary: Summary) -> dict[str, Any]:
-    """Return a summary as values that JSON knows; keys carry units."""
+    """Return a summary as values for JSON; keys carry units."""
     ellipse = summary.ellipse
     return {
-        'question': study_document(summary.question),
-        'flights': summary.question.size,
+        'question': study_document(summary.study),  # keys are as in 0.1: programs read them
+        'flights': summary.study.size,
         'counts': summary.counts,
         'results': {
             name: {
@@ -86,22 +85,31 @@ def summary_document(summary: Summary) -> dict[str, Any]:
         },
         'landing_ellipse': None if ellipse is None else _ellipse_document(ellipse),
         'best': [
-            {'of': b.answer, 'at': columns_of(b.values), 'mean': b.mean, 'sd': b.sd}
+            {'of': b.result, 'at': columns_of(b.values), 'mean': b.mean, 'sd': b.sd}
             for b in summary.best
         ],
-        'sensitivities': [asdict(s) for s in summary.sensitivities],
+        'sensitivities': [
+            {
+                'quantity': s.quantity,
+                'answer': s.result,
+                'slope': s.slope,
+                'correlation': s.correlation,
+                'first_order': s.first_order,
+            }
+            for s in summary.sensitivities
+        ],
         'explained_by_regression': summary.explained,
     }
 
 
 def columns_of(values: dict[str, float]) -> dict[str, float]:
-    """Return values by quantity under the names of their columns, with units."""
+    """Return values under the column names of their quantities, which carry units."""
     return {quantity('name', name).key: value for name, value in values.items()}
 
 
 def _spread_lines(summary: Summary) -> list[str]:
     if not summary.spreads:
-        return ['  no flight ended as it should: try a longer --duration or a shorter --step']
+        return ['  no flight ended as expected; try a longer --duration or a shorter --step']
     lines = ['                 mean       sd       5%      50%      95%    least greatest']
     for name in _SHOWN:
         s = summary.spreads[name]
@@ -119,13 +127,13 @@ def _ellipse_lines(ellipse: Ellipse) -> list[str]:
     side = 'left' if angle >= 0.0 else 'right'
     lines = [
         f'  landings around x {x:.2f}, y {y:.2f} m; ellipses of a normal law, long axis '
-        f'{abs(angle):.0f} degrees {side} of x:'
+        f'{abs(angle):.0f} degrees {side} of x'
     ]
     for percent in ELLIPSES:
         long, short, _ = ellipse.semi_axes(percent)
         lines.append(
-            f'    {percent}%: half axes {long:.2f} and {short:.2f} m, in it '
-            f'{ellipse.inside[percent]:.1%} of the landings'
+            f'    {percent}%: semi-axes {long:.2f} and {short:.2f} m, '
+            f'{ellipse.inside[percent]:.1%} of the landings inside'
         )
     return lines
 
@@ -134,15 +142,15 @@ def _sensitivity_lines(summary: Summary) -> list[str]:
     if not summary.sensitivities:
         return []
     lines = []
-    for answer in ANSWERS:
-        rows = [s for s in summary.sensitivities if s.answer == answer]
+    for result in MAIN_RESULTS:
+        rows = [s for s in summary.sensitivities if s.result == result]
         if not rows:
             continue
-        name, _, unit = answer.rpartition('_')
+        name, _, unit = result.rpartition('_')
         rows.sort(key=lambda s: -abs(s.correlation))
         share = '' if rows[0].first_order is None else '; share: first-order Sobol index'
-        explained = summary.explained[answer]
-        lines.append(f'  {name} follows (linear regression, R^2 {explained:.2f}{share})')
+        explained = summary.explained[result]
+        lines.append(f'  {name} depends on (linear regression, R^2 {explained:.2f}{share})')
         for s in rows[:8]:
             q = quantity('name', s.quantity)
             per = f'{unit} per {_ONE.get(q.unit, q.unit) or "1"}'
@@ -153,23 +161,23 @@ def _sensitivity_lines(summary: Summary) -> list[str]:
 
 
 def _ellipse_document(ellipse: Ellipse) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    document: dict[str, Any] = {
         'centre_m': list(ellipse.centre),
         'covariance_m2': _listed(ellipse.covariance),
     }
     for percent in ELLIPSES:
         long, short, angle = ellipse.semi_axes(percent)
-        found[f'{percent}%'] = {
+        document[f'{percent}%'] = {
             'semi_axes_m': [long, short],
             'angle_left_of_x_deg': angle,
             'landings_inside': ellipse.inside[percent],
         }
-    return found
+    return document
 
 
 def _listed(matrix: FloatArray) -> list[list[float]]:
-    found: list[list[float]] = matrix.tolist()
-    return found
+    rows: list[list[float]] = matrix.tolist()
+    return rows
 
 
 def _value(name: str, value: float) -> str:
@@ -178,12 +186,12 @@ def _value(name: str, value: float) -> str:
     return f'{name} {value:.6g}{unit}'
 
 
-def _told(name: str, values: str) -> str:
+def _with_unit(name: str, values: str) -> str:
     q = quantity('name', name)
     unit = q.short_unit
     return f'{q.name.replace("_", " ")} {values} {unit}'.rstrip().replace(' °', '°')
 
 
-def _mean(question: Study, name: str, law: Normal) -> float:
-    mean = question.fixed(name) if law.mean is None else law.mean
+def _mean(study: Study, name: str, law: Normal) -> float:
+    mean = study.fixed(name) if law.mean is None else law.mean
     return 0.0 if math.isclose(mean, 0.0, abs_tol=1e-300) else mean

@@ -1,4 +1,4 @@
-"""Points in the unit cube: sample i depends on the seed and on i alone, wherever it is drawn."""
+"""Samples of the unit cube: sample i depends only on the seed and on i, in any batch."""
 
 from functools import lru_cache
 
@@ -11,10 +11,10 @@ from disc_sim_ros.arrays import FloatArray
 RANDOM, SOBOL = 'random', 'sobol'
 METHODS = (RANDOM, SOBOL)
 MOST_SAMPLES = 2**30
-_BLOCK = 4096  # samples of one setting of the counter
-_BITS = 30  # of a Sobol number, as scipy draws it
-_SCRAMBLING = 2**63  # keys of Philox from here on draw scrambles, below them samples
-_LEAST = 2.0**-54  # half of the smallest step of a random double: no sample is 0
+_BLOCK = 4096  # samples per value of the counter
+_BITS = 30  # binary digits of a Sobol number, as in scipy
+_SCRAMBLING = 2**63  # Philox keys from here on are for scrambles, lower ones for samples
+_LEAST = 2.0**-54  # half of the smallest step of a random double; instead of the sample 0
 
 IntArray = NDArray[np.int64]
 
@@ -27,11 +27,11 @@ def unit_samples(
     Args:
         method: 'random' (Philox; each dimension has a stream of its own) or 'sobol' (scrambled by
             a random linear matrix and a digital shift).
-        dimensions: Of the cube.
-        seed: From 0; of the streams or of the scramble.
+        dimensions: Dimensions of the cube.
+        seed: Seed of the streams or of the scramble, from 0.
         start: First sample.
         stop: The sample after the last.
-        count: Samples of the whole ensemble. It changes no value, only what is prepared.
+        count: Samples of the whole ensemble. It changes no sample, only the size of the tables.
     """
     if method == SOBOL:
         return _sobol(dimensions, seed, np.arange(start, stop), max(count - 1, 1).bit_length())
@@ -49,7 +49,7 @@ def unit_samples(
 
 
 def _sobol(dimensions: int, seed: int, index: IntArray, bits: int) -> FloatArray:
-    """Return the points of an index: each bit of its Gray code turns one set of binary digits."""
+    """Return Sobol points by index: each bit of its Gray code flips one set of binary digits."""
     basis, shift = _scrambled_basis(dimensions, seed, bits)
     gray = index ^ (index >> 1)
     digits = np.broadcast_to(shift, (len(index), dimensions)).copy()
@@ -60,9 +60,9 @@ def _sobol(dimensions: int, seed: int, index: IntArray, bits: int) -> FloatArray
 
 @lru_cache(maxsize=8)
 def _scrambled_basis(dimensions: int, seed: int, bits: int) -> tuple[IntArray, IntArray]:
-    """Return the digits that each bit turns, shape (bits, dimensions), and those of point 0.
+    """Return the digits that each bit flips, shape (bits, dimensions), and those of point 0.
 
-    Source: Matousek, J. Complexity 14 (1998) 527-556: random linear scrambling.
+    Source: random linear scrambling of Matousek, J. Complexity 14 (1998) 527-556.
     """
     digit = np.arange(_BITS)
     basis = (_sobol_basis(dimensions, bits)[..., None] >> (_BITS - 1 - digit)) & 1

@@ -1,4 +1,4 @@
-"""How a quantity scatters: its law, its quantiles within hard bounds, and correlations."""
+"""Laws of scatter: normal and uniform, their quantiles within hard bounds, and correlations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 
-_FAR = 8.5  # standard deviations: beyond is less than one in 1e16
+_FAR = 8.5  # standard deviations: less than one in 1e16 samples lies beyond
 
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """A normal law, cut off where the quantity itself ends (a speed at 0).
+    """A normal law, truncated at the bounds of the quantity (a speed at 0).
 
     Attributes:
         sd: Standard deviation, above 0.
-        mean: None for the value that would be flown without scatter.
+        mean: Mean; None for the value that the quantity has without scatter.
     """
 
     sd: float
@@ -34,7 +34,7 @@ class Normal:
 
 @dataclass(frozen=True, slots=True)
 class Uniform:
-    """Every value between `low` and `high` is as likely as another."""
+    """A uniform law: all values between `low` and `high` are equally likely."""
 
     low: float
     high: float
@@ -47,14 +47,14 @@ class Uniform:
 def quantiles(
     law: Normal | Uniform, scores: FloatArray, centre: ArrayLike, lowest: float, highest: float
 ) -> FloatArray:
-    """Return the values of a law that belong to standard normal scores.
+    """Return the values of a law at standard normal scores, shape (n,).
 
     Args:
-        law: How the quantity scatters.
-        scores: Standard normal numbers, shape (n,).
-        centre: Mean of a `Normal` that has none of its own, shape () or (n,).
-        lowest: Hard bounds of the quantity; the law is cut off there and keeps its shape inside.
-        highest: The other one.
+        law: The law of the quantity.
+        scores: Standard normal scores, shape (n,).
+        centre: Mean of a `Normal` without a mean, shape () or (n,).
+        lowest: Lower bound of the quantity; a normal law is truncated there.
+        highest: Upper bound, likewise.
     """
     if isinstance(law, Uniform):
         values: FloatArray = law.low + (law.high - law.low) * ndtr(scores)
@@ -70,30 +70,31 @@ def quantiles(
 def probabilities(
     law: Normal | Uniform, values: FloatArray, centre: float, lowest: float, highest: float
 ) -> FloatArray:
-    """Return the share of a law below each value: what `quantiles` undoes."""
-    found: FloatArray
+    """Return the cumulative probability of each value: the inverse of `quantiles`."""
+    below_value: FloatArray
     if isinstance(law, Uniform):
-        found = (values - law.low) / (law.high - law.low)
-        return found
+        below_value = (values - law.low) / (law.high - law.low)
+        return below_value
     mean = centre if law.mean is None else law.mean
     below, above = ndtr([(lowest - mean) / law.sd, (highest - mean) / law.sd])
-    found = (ndtr((values - mean) / law.sd) - below) / (above - below)
-    return found
+    below_value = (ndtr((values - mean) / law.sd) - below) / (above - below)
+    return below_value
 
 
 def correlation_factor(
     names: Sequence[str], correlations: Mapping[tuple[str, str], float]
 ) -> FloatArray:
-    """Return L with L L^T = the correlation matrix of `names`, shape (n, n), lower triangular.
+    """Return the Cholesky factor of the correlation matrix of `names`, shape (n, n).
 
     Raises:
-        ConfigError: A name that is not there, a pair twice, or a matrix that no scatter has.
+        ConfigError: An unknown name, a pair given twice, or a matrix that is not positive
+            definite.
     """
     matrix = np.eye(len(names))
     for (a, b), value in correlations.items():
         for name in (a, b):
             if name not in names:
-                allowed = f'only what scatters is correlated: {", ".join(names) or "nothing"}'
+                allowed = f'only scattered quantities are correlated: {", ".join(names) or "none"}'
                 raise ConfigError('correlation', name, allowed)
         i, j = names.index(a), names.index(b)
         if i == j:
@@ -105,5 +106,5 @@ def correlation_factor(
         return np.asarray(np.linalg.cholesky(matrix), dtype=float)
     except np.linalg.LinAlgError:
         text = ', '.join(f'{a},{b}={r:g}' for (a, b), r in correlations.items())
-        allowed = 'no quantities can be correlated so; give smaller correlations'
+        allowed = 'the matrix is not positive definite; give smaller correlations'
         raise ConfigError('correlation', text, allowed) from None

@@ -1,7 +1,8 @@
-"""Finished batches on the way to one file: a folder of parts that outlives the process.
+"""Storage of an unfinished sweep: a folder of finished batches that outlives the process.
 
-Each part is a whole Parquet file that appears by rename, so that a kill, a full disk or a power
-cut costs the batches in flight and nothing else. `question.json` says what they answer.
+Each part is a complete Parquet file that appears by a rename. If the process is killed, or the
+disk is full, or the power fails, only the batches in progress are lost. The manifest holds the
+study.
 """
 
 from contextlib import suppress
@@ -20,41 +21,41 @@ from disc_sim_ros.studies import tables
 from disc_sim_ros.studies.study import Study, study_differences, study_document
 
 _PART = re.compile(r'(\d{10})\.parquet')
-_MANIFEST = 'question.json'
+_MANIFEST = 'question.json'  # as since 0.1: an older folder must not pass for an empty one
 
 
 class Parts:
-    """The folder FILE.parts of an unfinished ensemble; a context that holds its lock.
+    """The folder FILE.parts of an unfinished sweep; a context manager that holds its lock.
 
     Args:
-        output: The file that it will become.
-        question: What the ensemble answers.
-        batch: Flights in a part; of a resumed ensemble None takes what it began with.
-        resume: Go on with what is there; else there must be nothing.
-        force: Throw away what is there.
+        output: The file to make of the parts.
+        study: The flights.
+        batch: Flights in a part; None for the default, or for that of the sweep to resume.
+        resume: Continue an unfinished sweep.
+        force: Discard an unfinished sweep.
 
     Raises:
-        ConfigError: Unfinished flights are there and neither is chosen, or they answer another
-            question, or another process is at it.
+        ConfigError: There is an unfinished sweep and neither `resume` nor `force` is given, or
+            it is of another study, or another process works on it.
         DiscSimError: The folder cannot be made.
     """
 
     def __init__(
-        self, output: Path, question: Study, batch: int | None, *, resume: bool, force: bool
+        self, output: Path, study: Study, batch: int | None, *, resume: bool, force: bool
     ) -> None:
         self.output = output
         self.folder = output.with_name(f'{output.name}.parts')
-        self.question = question
+        self.study = study
         if force and not resume:
             shutil.rmtree(self.folder, ignore_errors=True)
-        found = self._manifest()
-        if found is None:
+        manifest = self._manifest()
+        if manifest is None:
             self.batch = batch or DEFAULT_BATCH
-            self._begin()
+            self._start()
         else:
-            self.batch = self._continued(found, batch, resume=resume)
-        self._lock = self._locked()
-        self.done = self._sound_parts()
+            self.batch = self._continue(manifest, batch, resume=resume)
+        self._lock = self._acquire_lock()
+        self.done = self._complete_parts()
 
     def __enter__(self) -> Self:
         return self
@@ -69,25 +70,25 @@ class Parts:
 
     @property
     def batches(self) -> int:
-        """Return how many parts there will be."""
-        return -(-self.question.size // self.batch)
+        """Return the number of all parts."""
+        return -(-self.study.size // self.batch)
 
     @property
     def flights_done(self) -> int:
-        """Return how many flights are finished and kept."""
+        """Return the number of flights in the finished parts."""
         return sum(len(range(*self.span(number))) for number in self.done)
 
     def span(self, number: int) -> tuple[int, int]:
         """Return the first flight of a part and the one after its last."""
         start = number * self.batch
-        return start, min(start + self.batch, self.question.size)
+        return start, min(start + self.batch, self.study.size)
 
     def missing(self) -> list[int]:
-        """Return the parts that are not there yet."""
+        """Return the numbers of the parts that are not finished."""
         return [number for number in range(self.batches) if number not in self.done]
 
     def path(self, number: int) -> Path:
-        """Return the file of a part."""
+        """Return the path of a part."""
         return self.folder / f'{number:010d}.parquet'
 
     def keep(self, number: int, columns: tables.Columns) -> None:
@@ -103,7 +104,7 @@ class Parts:
         self.done.add(number)
 
     def join(self) -> None:
-        """Make the one file of all parts, and remove them.
+        """Join all parts into the output file, and remove them.
 
         Raises:
             DiscSimError: The system refuses; the parts are kept.
@@ -111,7 +112,7 @@ class Parts:
         joined = self.output.with_name(f'{self.output.name}.joining')
         paths = [self.path(number) for number in range(self.batches)]
         try:
-            tables.join(paths, joined, self.output.suffix.lower(), self.question)
+            tables.join(paths, joined, self.output.suffix.lower(), self.study)
             joined.replace(self.output)
             sync_folder(self.output.parent)
         except OSError as error:
@@ -123,62 +124,64 @@ class Parts:
     def _manifest(self) -> dict[str, Any] | None:
         path = self.folder / _MANIFEST
         try:
-            found: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+            manifest: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
-            allowed = f'cannot read {path} ({error}); --force begins anew'
+            allowed = f'cannot read {path} ({error}); --force starts again'
             raise ConfigError('output', str(self.output), allowed) from None
-        return found
+        return manifest
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            content = study_document(self.question) | {'batch': self.batch}
+            content = study_document(self.study) | {'batch': self.batch}
             write_whole(self.folder / _MANIFEST, json.dumps(content, indent=1).encode())
         except OSError as error:
             raise DiscSimError(f'cannot write in {self.folder} ({reason(error)})') from None
 
-    def _continued(self, found: dict[str, Any], batch: int | None, *, resume: bool) -> int:
-        begun = int(found.pop('batch', 0))
+    def _continue(self, manifest: dict[str, Any], batch: int | None, *, resume: bool) -> int:
+        """Return the batch size of the unfinished sweep, if it is one of the same study."""
+        stored_batch = int(manifest.pop('batch', 0))
         if not resume:
             allowed = (
-                f'{self.folder} holds an unfinished one; --resume goes on, --force begins anew'
+                f'{self.folder} holds an unfinished sweep; --resume continues it, --force starts '
+                'again'
             )
             raise ConfigError('output', str(self.output), allowed)
-        different = study_differences(found, study_document(self.question))
-        if batch not in {None, begun}:
-            different.append(f'batch {begun}, now {batch}')
-        if different:
-            text = '; '.join(different[:3]) + ('; ...' if len(different) > 3 else '')
-            allowed = f'what was begun differs: {text}'
+        differences = study_differences(manifest, study_document(self.study))
+        if batch not in {None, stored_batch}:
+            differences.append(f'batch {stored_batch}, now {batch}')
+        if differences:
+            text = '; '.join(differences[:3]) + ('; ...' if len(differences) > 3 else '')
+            allowed = f'the unfinished sweep is of another study: {text}'
             raise ConfigError('resume', str(self.output), allowed)
-        return begun
+        return stored_batch
 
-    def _locked(self) -> int:
+    def _acquire_lock(self) -> int:
         lock = os.open(self.folder / _MANIFEST, os.O_RDONLY)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             os.close(lock)
-            allowed = 'another process is flying it at this moment'
+            allowed = 'another process works on this sweep at the moment'
             raise ConfigError('output', str(self.output), allowed) from None
         return lock
 
-    def _sound_parts(self) -> set[int]:
-        """Return the parts that are whole; remove what is not, such as leftovers of a kill."""
-        sound = set()
+    def _complete_parts(self) -> set[int]:
+        """Return the complete parts, and remove incomplete ones, such as those of a killed run."""
+        complete = set()
         for path in self.folder.iterdir():
             match = _PART.fullmatch(path.name)
             number = int(match[1]) if match else -1
             if match and number < self.batches:
                 start, stop = self.span(number)
                 if tables.rows_of(path) == stop - start:
-                    sound.add(number)
+                    complete.add(number)
                     continue
             if match or path.suffix == '.part':
                 path.unlink()
-        return sound
+        return complete
 
 
-DEFAULT_BATCH = 8192  # flights: half a second on one core, 1 MB
+DEFAULT_BATCH = 8192  # flights; half a second on one core, 1 MB

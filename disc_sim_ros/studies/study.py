@@ -1,4 +1,4 @@
-"""The question that an ensemble answers: what is thrown, what differs, and how it is drawn."""
+"""A study: an ensemble of flights, the quantities that differ between them, and their law."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,29 +38,30 @@ MOST_FLIGHTS = 10**9
 class Study:
     """Flights at every point of a grid, each with `count` samples of scatter.
 
-    Flight i is sample i mod count at grid point i div count, the last name of `vary` turning
-    fastest; sample k is the same at every grid point, so that points compare by themselves.
+    Flight i is sample i mod count at grid point i div count; the last name of `vary` changes
+    fastest. Sample k is the same at every grid point, so that differences between grid points are
+    not caused by the scatter.
 
     Attributes:
         setup: Disc, model, air, wind and step.
-        launch: The release where nothing else is said.
-        control: Control inputs where nothing else is said; coefficients only.
-        advance_ratio: Spin as r c / (2 V) of each flight instead of `launch.spin`, or None.
-        vary: Values of each quantity of the grid; names as in `quantities.VARIED`.
-        scatter: How each scattered quantity is drawn. A quantity may be in both: `Normal` without
-            a mean scatters around the grid.
-        correlations: Of pairs of scattered quantities, between -1 and 1; of their normal
-            scores, where a quantity is uniform. Pairs that are not named are 0.
+        launch: The release, for quantities that neither vary nor scatter.
+        control: Control inputs, likewise; coefficients only.
+        advance_ratio: Spin of each flight as r c / (2 V), instead of `launch.spin`; or None.
+        vary: Values of each grid quantity; names as in `quantities.VARIED`.
+        scatter: The law of each scattered quantity. A grid quantity may scatter too: by a
+            `Normal` without a mean, around each value of the grid.
+        correlations: Correlation of pairs of scattered quantities, from -1 to 1; of uniform
+            quantities, that of their normal scores. Pairs without an entry are uncorrelated.
         count: Samples at each grid point.
-        seed: Of the scatter. The gusts begin with `setup.wind.seed`.
+        seed: Seed of the scatter. The seed of the gusts is `setup.wind.seed`.
         sampling: 'random' or 'sobol'.
-        gusts: 'each': sample k flies in the gusts of seed `setup.wind.seed` + k; 'same': all fly
-            in those of `setup.wind.seed`.
+        gusts: 'each': sample k flies in the gusts of seed `setup.wind.seed` + k; 'same': all
+            flights fly in the gusts of seed `setup.wind.seed`.
         duration: Longest time of flight [s].
-        ground: End where the centre crosses z = 0.
+        ground: True to end a flight where the centre of the disc crosses z = 0.
 
     Raises:
-        ConfigError: Something is out of range, or contradicts something else.
+        ConfigError: A value is out of range, or two of them contradict each other.
     """
 
     setup: flight.Setup
@@ -85,19 +86,19 @@ class Study:
         self._check_names()
         self._check_kinds()
         if self.size > MOST_FLIGHTS:
-            raise ConfigError('count', self.size, f'at most {MOST_FLIGHTS} flights altogether')
+            raise ConfigError('count', self.size, f'at most {MOST_FLIGHTS} flights in total')
         _ = self._factor
         self._check_extremes()
 
     @cached_property
     def varied(self) -> tuple[Quantity, ...]:
-        """Return the quantities of the grid and then those that are only scattered."""
+        """Return the grid quantities, followed by those that only scatter."""
         names = dict.fromkeys([*self.vary, *self.scatter])
         return tuple(quantity('name', name) for name in names)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Return the number of values of each quantity of the grid."""
+        """Return the number of values of each grid quantity."""
         return tuple(len(values) for values in self.vary.values())
 
     @property
@@ -112,24 +113,24 @@ class Study:
 
     @property
     def gusts_differ(self) -> bool:
-        """Say whether each sample has gusts of its own."""
+        """Return True if each sample flies in gusts of its own."""
         return self.setup.wind.turbulence > 0.0 and self.gusts == EACH
 
     def values(self, start: int, stop: int) -> dict[str, FloatArray]:
-        """Return what differs in flights `start` to `stop`, each of shape (stop - start,)."""
+        """Return what differs in flights `start` to `stop`, by name; shape (stop - start,)."""
         index = np.arange(start, stop)
-        found: dict[str, FloatArray] = {}
+        columns: dict[str, FloatArray] = {}
         if self.vary:
             places = np.unravel_index(index // self.count, self.shape)
             for (name, values), place in zip(self.vary.items(), places, strict=True):
-                found[name] = np.asarray(values, dtype=float)[place]
+                columns[name] = np.asarray(values, dtype=float)[place]
         if self.scatter:
-            drawn = self._scores_of(index % self.count)
+            scores = self._scores_of(index % self.count)
             for j, (name, law) in enumerate(self.scatter.items()):
-                centre = found.get(name, self.fixed(name))
+                centre = columns.get(name, self.fixed(name))
                 lowest, highest = self.bounds(name)
-                found[name] = quantiles(law, drawn[:, j], centre, lowest, highest)
-        return found
+                columns[name] = quantiles(law, scores[:, j], centre, lowest, highest)
+        return columns
 
     def scores(self, start: int, stop: int) -> FloatArray:
         """Return the standard normal scores of samples, shape (stop - start, scattered)."""
@@ -139,7 +140,7 @@ class Study:
         scores: FloatArray = ndtri(unit)
         if not self.correlations:
             return scores
-        # Not a matrix product, whose last bit would depend on the number of rows.
+        # Not a matrix product: its last bit would depend on the number of rows.
         mixed = np.zeros_like(scores)
         for i, row in enumerate(self._factor):
             for j in range(i + 1):
@@ -147,16 +148,16 @@ class Study:
         return mixed
 
     def gust_seeds(self, start: int, stop: int) -> NDArray[np.int64] | None:
-        """Return the seeds of the gusts of flights `start` to `stop`; None if they do not differ.
+        """Return the seeds of the gusts of flights `start` to `stop`; None if all are the same.
 
-        `fly --seed` flies in the same gusts.
+        `fly --seed` with one of them flies in the same gusts.
         """
         if not self.gusts_differ:
             return None
         return self.setup.wind.seed + np.arange(start, stop) % self.count
 
     def fixed(self, name: str) -> float:
-        """Return the value of a quantity where it is neither varied nor scattered."""
+        """Return the value of a quantity that neither varies nor scatters."""
         if name in LAUNCH:
             return float(getattr(self.launch, name))
         if name in WIND:
@@ -168,7 +169,7 @@ class Study:
         return fixed_property(self.setup, name)
 
     def bounds(self, name: str) -> tuple[float, float]:
-        """Return the least and the greatest value that a quantity can have in a flight."""
+        """Return the least and the greatest value that a quantity may have in a flight."""
         q = quantity('name', name)
         return (0.0 if name == 'height' and self.ground else q.lowest), q.highest
 
@@ -177,12 +178,12 @@ class Study:
         return correlation_factor(tuple(self.scatter), self.correlations)
 
     def _scores_of(self, sample: NDArray[np.int64]) -> FloatArray:
-        """Return the scores of samples, which ascend but for turns, shape (n, scattered)."""
+        """Return the scores of runs of ascending samples, shape (n, scattered)."""
         turns = np.flatnonzero(np.diff(sample) < 0) + 1
-        if len(turns) > 1:  # every sample is among them
+        if len(turns) > 1:  # every sample occurs
             return self.scores(0, self.count)[sample]
-        pieces = [p for p in np.split(sample, turns) if len(p)]
-        return np.concatenate([self.scores(int(p[0]), int(p[-1]) + 1) for p in pieces])
+        runs = [run for run in np.split(sample, turns) if len(run)]
+        return np.concatenate([self.scores(int(run[0]), int(run[-1]) + 1) for run in runs])
 
     def _check_names(self) -> None:
         for thing, given in (('vary', list(self.vary)), ('scatter', list(self.scatter))):
@@ -191,29 +192,29 @@ class Study:
                     raise ConfigError(thing, name, f'its name is {quantity(thing, name).name}')
         both = [n for n in self.vary if n in self.scatter and not _is_around(self.scatter[n])]
         if both:
-            allowed = 'it is varied already; scatter it with a standard deviation alone'
+            allowed = 'it is varied already; give its scatter as a standard deviation only'
             raise ConfigError('scatter', both[0], allowed)
         names = {q.name for q in self.varied}
         if 'spin' in names and (ADVANCE_RATIO in names or self.advance_ratio is not None):
-            raise ConfigError('spin', ADVANCE_RATIO, 'one of them gives the other, give one')
+            raise ConfigError('spin', ADVANCE_RATIO, 'one determines the other; give one')
         for name, values in self.vary.items():
             if not len(values):
                 raise ConfigError(f'vary {name}', [], 'give at least one value')
             if len(set(values)) < len(values):
-                raise ConfigError(f'vary {name}', list(values), 'a value is there twice')
+                raise ConfigError(f'vary {name}', list(values), 'a value occurs twice')
 
     def _check_kinds(self) -> None:
         if self.sampling == sampling.SOBOL and not self.scatter:
-            raise ConfigError('sampling', 'sobol', 'nothing scatters; give what does')
+            raise ConfigError('sampling', 'sobol', 'no quantity scatters; give one that does')
         if self.count > 1 and not self.scatter and not self.gusts_differ:
-            allowed = 'nothing differs from sample to sample; give scatter, or gusts that do'
+            allowed = 'all samples would be the same; give a scatter, or gusts that differ'
             raise ConfigError('count', self.count, allowed)
         if self.gusts_differ and self.setup.wind.seed + self.count > LARGEST_SEED:
-            raise ConfigError('seed', self.setup.wind.seed, 'each sample needs a seed above it')
+            raise ConfigError('seed', self.setup.wind.seed, f'seed + count is at most {LARGEST_SEED}')
 
     @cached_property
     def fastest_spin(self) -> float:
-        """Return the greatest spin of a flight, of normal scatter at 6 standard deviations."""
+        """Return the greatest spin of any flight [rad/s]; normal scatter counts to 6 sd."""
         ratio = self._largest(ADVANCE_RATIO)
         if ratio == 0.0:
             return self._largest('spin')
@@ -223,7 +224,7 @@ class Study:
         return max(abs(x) for x in self._ends(quantity('name', name)))
 
     def _check_extremes(self) -> None:
-        """Refuse values out of range, and a step that is too long for the fastest flight."""
+        """Refuse values out of range, and a step that is too long for the fastest spin."""
         for q in self.varied:
             self._ends(q)
         spin = quantity('name', 'spin').within(0.0).check(self.fastest_spin)
@@ -238,7 +239,7 @@ class Study:
         flight.checked_control(self.control)
 
     def _ends(self, q: Quantity) -> tuple[float, ...]:
-        """Return the values between which a quantity lies, of scatter those of +-6 sd."""
+        """Return the values between which a quantity lies; normal scatter counts to 6 sd."""
         lowest, highest = self.bounds(q.name)
         values = [
             validation.number(f'vary {q.name}', x, lowest, highest, unit=q.unit)
@@ -262,16 +263,17 @@ def _is_around(law: Normal | Uniform) -> bool:
     return isinstance(law, Normal) and law.mean is None
 
 
-def study_document(question: Study) -> dict[str, Any]:
-    """Return all that decides the flights of a question; the disc as a disc file holds it.
+def study_document(study: Study) -> dict[str, Any]:
+    """Return everything that determines the flights of a study, as values for JSON.
 
-    Angles are in degrees, all else in SI units; wind is where the air moves to, in `map` axes.
+    Angles are in degrees, all other quantities in SI units; the disc has the keys of a disc file;
+    the wind is the velocity of the air in `map` axes.
     """
-    setup = question.setup
+    setup = study.setup
     names = (*LAUNCH, *WIND, *CONTROL)
-    fixed = {name: question.fixed(name) for name in names}
-    if question.advance_ratio is not None or ADVANCE_RATIO in question.vary:
-        fixed[ADVANCE_RATIO] = question.fixed(ADVANCE_RATIO)
+    fixed = {name: study.fixed(name) for name in names}
+    if study.advance_ratio is not None or ADVANCE_RATIO in study.vary:
+        fixed[ADVANCE_RATIO] = study.fixed(ADVANCE_RATIO)
         del fixed['spin']
     return {
         'version': __version__,
@@ -286,38 +288,38 @@ def study_document(question: Study) -> dict[str, Any]:
         'reference_height': setup.wind.reference_height,
         'turbulence': setup.wind.turbulence,
         'gust_seed': setup.wind.seed,
-        'gust_seeds': question.gusts,
+        'gust_seeds': study.gusts,
         'step': setup.step,
-        'duration': question.duration,
-        'ground': question.ground,
+        'duration': study.duration,
+        'ground': study.ground,
         'fixed': fixed,
-        'vary': {name: [float(x) for x in values] for name, values in question.vary.items()},
+        'vary': {name: [float(x) for x in values] for name, values in study.vary.items()},
         'scatter': {
             name: {'normal': [law.mean, law.sd]}
             if isinstance(law, Normal)
             else {'uniform': [law.low, law.high]}
-            for name, law in question.scatter.items()
+            for name, law in study.scatter.items()
         },
-        'correlations': {f'{a},{b}': r for (a, b), r in question.correlations.items()},
-        'count': question.count,
-        'seed': question.seed,
-        'sampling': question.sampling,
+        'correlations': {f'{a},{b}': r for (a, b), r in study.correlations.items()},
+        'count': study.count,
+        'seed': study.seed,
+        'sampling': study.sampling,
     }
 
 
 def study_differences(
     old: Mapping[str, Any], new: Mapping[str, Any], prefix: str = ''
 ) -> list[str]:
-    """Return what differs between two documents, each as 'name OLD, now NEW'."""
-    found: list[str] = []
+    """Return the differences between two documents, each as 'name OLD, now NEW'."""
+    differences: list[str] = []
     for key in dict.fromkeys([*old, *new]):
         before, after = old.get(key), new.get(key)
         if isinstance(before, dict) and isinstance(after, dict):
             within = '' if key == 'fixed' else f'{key} '
-            found += study_differences(before, after, f'{prefix}{within}')
+            differences += study_differences(before, after, f'{prefix}{within}')
         elif before != after:
-            found.append(f'{prefix}{key} {_shown(before)}, now {_shown(after)}')
-    return found
+            differences.append(f'{prefix}{key} {_shown(before)}, now {_shown(after)}')
+    return differences
 
 
 def _shown(value: object) -> str:

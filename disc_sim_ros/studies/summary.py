@@ -1,4 +1,4 @@
-"""What an ensemble says: spread, landing ellipses, sensitivities, and the best grid point."""
+"""Summary of a study: spread, landing ellipses, sensitivities, and the best grid point."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from disc_sim_ros.studies.study import Study
 
 SPREADS = ('range_m', 'drift_m', 'time_s', 'apex_m', 'x_m', 'y_m', 'end_speed_m_s',
            'end_spin_rad_s')  # fmt: skip
-ANSWERS = ('range_m', 'drift_m', 'time_s')  # whose sensitivities are told
+MAIN_RESULTS = ('range_m', 'drift_m', 'time_s')  # those with sensitivities and grid means
 PERCENTS = (5.0, 25.0, 50.0, 75.0, 95.0)
-ELLIPSES = (50, 90, 95)  # per cent
-MOST_POINTS = 2_000_000  # grid points of which each is remembered
+ELLIPSES = (50, 90, 95)  # percent
+MOST_POINTS = 2_000_000  # of a grid whose means are kept in memory
 _LEAST_FOR_BINS = 500  # flights
 
 Chunks = Callable[[list[str]], Iterable[tables.Columns]]
@@ -28,7 +28,7 @@ Chunks = Callable[[list[str]], Iterable[tables.Columns]]
 
 @dataclass(frozen=True)
 class Spread:
-    """How one result spreads over the flights that ended as they should."""
+    """The distribution of one result over the flights with the expected end."""
 
     mean: float
     sd: float
@@ -42,9 +42,9 @@ class Ellipse:
     """Landing ellipses of a normal law with the mean and covariance of the landings.
 
     Attributes:
-        centre: Mean x, y [m].
-        covariance: Of x, y [m^2], shape (2, 2).
-        inside: Share of the landings that each ellipse of `ELLIPSES` really holds.
+        centre: Mean of x, y [m].
+        covariance: Covariance of x, y [m^2], shape (2, 2).
+        inside: Share of the landings inside each ellipse of `ELLIPSES`.
     """
 
     centre: tuple[float, float]
@@ -52,7 +52,7 @@ class Ellipse:
     inside: dict[int, float]
 
     def semi_axes(self, percent: float) -> tuple[float, float, float]:
-        """Return the long and the short half axis [m], and the angle left of x [degrees]."""
+        """Return both semi-axes, the long one first [m], and its angle left of x [degrees]."""
         values, vectors = np.linalg.eigh(self.covariance)
         short, long = np.sqrt(radius2(percent) * np.maximum(values, 0.0))
         angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
@@ -61,18 +61,21 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How much one result follows one scattered quantity.
+    """The influence of one scattered quantity on one result.
 
     Attributes:
-        slope: Change of the result per unit of the quantity, of the linear regression.
-        correlation: Slope in standard deviations of both: the standardised regression
-            coefficient.
-        first_order: First-order Sobol index, the share of the variance that the quantity explains
-            alone; None where quantities are correlated or flights are few.
+        quantity: Name of the quantity.
+        result: Column of the result.
+        slope: Regression coefficient: change of the result per unit of the quantity.
+        correlation: Standardised regression coefficient: the slope in standard deviations of the
+            result and of the quantity.
+        first_order: First-order Sobol index: the share of the variance of the result that the
+            quantity alone explains; None if quantities are correlated or there are too few
+            flights.
     """
 
     quantity: str
-    answer: str
+    result: str
     slope: float
     correlation: float
     first_order: float | None
@@ -82,7 +85,7 @@ class Sensitivity:
 class Best:
     """The grid point with the greatest mean of one result."""
 
-    answer: str
+    result: str
     values: dict[str, float]
     mean: float
     sd: float
@@ -91,22 +94,23 @@ class Best:
 
 @dataclass(frozen=True)
 class Summary:
-    """What an ensemble says. Results are of the flights that ended as they should.
+    """Summary of a study, of the flights with the expected end.
 
-    Those landed, or with `ground=False` those whose time was up; never those that were lost.
+    Expected are flights that landed or, with `ground=False`, that lasted for the whole duration.
 
     Attributes:
-        counts: Flights by their end, keys as in `quantities.STATUS`.
-        spreads: By the column of the result.
-        ellipse: Of the landings, or None for less than three.
-        sensitivities: Of scatter without a grid.
+        study: The flights.
+        counts: Number of flights by their end, keys as in `columns.STATUS`.
+        spreads: Distribution of each result, by its column.
+        ellipse: Landing ellipses, or None for less than three landings.
+        sensitivities: Sensitivities, if quantities scatter without a grid.
         explained: Share of the variance of each result that the regression explains (R^2).
-        best: For grids: the greatest range and time.
-        grid: For grids of up to `MOST_POINTS`: number, mean and variance of `ANSWERS` at each
-            point.
+        best: With a grid: the points of the greatest mean range and time.
+        grid: With a grid of up to `MOST_POINTS`: count, mean and variance of `MAIN_RESULTS` at
+            each point.
     """
 
-    question: Study
+    study: Study
     counts: dict[str, int]
     spreads: dict[str, Spread]
     ellipse: Ellipse | None
@@ -116,10 +120,10 @@ class Summary:
     grid: GroupMeans | None
 
 
-def summarise(flights: Path | tables.Columns, question: Study) -> Summary:
-    """Return the summary of a file of `run.sweep` or of the columns of `run.collect`.
+def summarise(flights: Path | tables.Columns, study: Study) -> Summary:
+    """Return the summary of a file of `runner.sweep` or of the columns of `runner.collect`.
 
-    A file is read twice in pieces; percentiles are exact to 1 / 65536 of the whole span.
+    A file is read twice, in chunks. Percentiles are accurate to 1 / 65536 of the range.
     """
 
     def chunks(names: list[str]) -> Iterable[tables.Columns]:
@@ -127,56 +131,56 @@ def summarise(flights: Path | tables.Columns, question: Study) -> Summary:
             return tables.chunks(flights, names)
         return iter([{name: flights[name] for name in names}])
 
-    return _second_pass(chunks, question, _FirstPass(chunks, question))
+    return _second_pass(chunks, study, _FirstPass(chunks, study))
 
 
 def radius2(percent: float) -> float:
-    """Return the squared radius, in standard deviations, of the ellipse that holds `percent`."""
+    """Return the squared radius, in standard deviations, of the ellipse of `percent`."""
     return -2.0 * math.log1p(-percent / 100.0)
 
 
 class _FirstPass:
-    """Counts, moments, grid points and bins."""
+    """The first pass over the flights: counts, moments, means at grid points and in bins."""
 
-    def __init__(self, chunks: Chunks, question: Study) -> None:
-        scattered = [] if question.vary else list(question.scatter)
-        self.inputs = [q for q in question.varied if q.name in scattered]
+    def __init__(self, chunks: Chunks, study: Study) -> None:
+        scattered = [] if study.vary else list(study.scatter)
+        self.inputs = [q for q in study.varied if q.name in scattered]
         columns = [q.key for q in self.inputs] + list(SPREADS)
         self.counts = np.zeros(len(STATUS), dtype=np.int64)
         self.moments = Moments(len(columns))
-        gridded = question.vary and question.points <= MOST_POINTS
-        self.grid = GroupMeans(question.points, len(ANSWERS)) if gridded else None
-        self.bins = self._bins(question)
+        gridded = study.vary and study.points <= MOST_POINTS
+        self.grid = GroupMeans(study.points, len(MAIN_RESULTS)) if gridded else None
+        self.bins = self._bins(study)
         for chunk in chunks(['index', 'status', *columns]):
             self.counts += np.bincount(chunk['status'], minlength=len(STATUS))
-            good = chunk['status'] == good_status(question)
+            good = chunk['status'] == expected_status(study)
             rows = np.column_stack([chunk[name][good] for name in columns])
             self.moments.add(rows)
-            answers = np.column_stack([chunk[name][good] for name in ANSWERS])
+            results = np.column_stack([chunk[name][good] for name in MAIN_RESULTS])
             if self.grid is not None:
-                self.grid.add(chunk['index'][good] // question.count, answers)
+                self.grid.add(chunk['index'][good] // study.count, results)
             for j, groups in enumerate(self.bins):
-                groups.add(self._place(question, j, rows[:, j], len(groups.n)), answers)
+                groups.add(self._place(study, j, rows[:, j], len(groups.n)), results)
 
-    def _bins(self, question: Study) -> list[GroupMeans]:
-        if question.correlations or question.count < _LEAST_FOR_BINS:
+    def _bins(self, study: Study) -> list[GroupMeans]:
+        if study.correlations or study.count < _LEAST_FOR_BINS:
             return []
-        count = min(64, round(math.sqrt(question.count)))
-        return [GroupMeans(count, len(ANSWERS)) for _ in self.inputs]
+        count = min(64, round(math.sqrt(study.count)))
+        return [GroupMeans(count, len(MAIN_RESULTS)) for _ in self.inputs]
 
-    def _place(self, question: Study, j: int, values: FloatArray, bins: int) -> NDArray[np.int64]:
+    def _place(self, study: Study, j: int, values: FloatArray, bins: int) -> NDArray[np.int64]:
         name = self.inputs[j].name
-        law = question.scatter[name]
-        share = probabilities(law, values, question.fixed(name), *question.bounds(name))
+        law = study.scatter[name]
+        share = probabilities(law, values, study.fixed(name), *study.bounds(name))
         return np.clip((share * bins).astype(np.int64), 0, bins - 1)
 
 
-def good_status(question: Study) -> int:
-    """Return the end that flights should have, an index of `STATUS`."""
-    return STATUS.index('landed' if question.ground else 'flying')
+def expected_status(study: Study) -> int:
+    """Return the expected end of a flight, an index of `STATUS`."""
+    return STATUS.index('landed' if study.ground else 'flying')
 
 
-def _second_pass(chunks: Chunks, question: Study, first: _FirstPass) -> Summary:
+def _second_pass(chunks: Chunks, study: Study, first: _FirstPass) -> Summary:
     m = first.moments
     offset = len(first.inputs)
     spreads: dict[str, Spread] = {}
@@ -190,9 +194,9 @@ def _second_pass(chunks: Chunks, question: Study, first: _FirstPass) -> Summary:
         inverse = np.linalg.pinv(covariance)
         inside = np.zeros(len(ELLIPSES), dtype=np.int64)
         for chunk in chunks(['status', *SPREADS]):
-            good = chunk['status'] == good_status(question)
-            for name, found in zip(SPREADS, percentiles, strict=True):
-                found.add(chunk[name][good])
+            good = chunk['status'] == expected_status(study)
+            for name, percentile in zip(SPREADS, percentiles, strict=True):
+                percentile.add(chunk[name][good])
             dx, dy = chunk['x_m'][good] - m.mean[x], chunk['y_m'][good] - m.mean[y]
             r2 = inverse[0, 0] * dx**2 + 2 * inverse[0, 1] * dx * dy + inverse[1, 1] * dy**2
             inside += [int(np.count_nonzero(r2 <= radius2(percent))) for percent in ELLIPSES]
@@ -208,19 +212,19 @@ def _second_pass(chunks: Chunks, question: Study, first: _FirstPass) -> Summary:
             ellipse = Ellipse((float(m.mean[x]), float(m.mean[y])), covariance, shares)
     sensitivities, explained = _sensitivities(first)
     return Summary(
-        question=question,
+        study=study,
         counts={name: int(n) for name, n in zip(STATUS, first.counts, strict=True)},
         spreads=spreads,
         ellipse=ellipse,
         sensitivities=sensitivities,
         explained=explained,
-        best=() if first.grid is None else _best(question, first.grid),
+        best=() if first.grid is None else _best(study, first.grid),
         grid=first.grid,
     )
 
 
 def _sensitivities(first: _FirstPass) -> tuple[tuple[Sensitivity, ...], dict[str, float]]:
-    """Return the linear regression of each answer on all inputs, and first-order indices."""
+    """Return the regression of each result on all inputs, and their first-order indices."""
     k, m = len(first.inputs), first.moments
     if not k or m.n < 3 * (k + 1):
         return (), {}
@@ -228,40 +232,40 @@ def _sensitivities(first: _FirstPass) -> tuple[tuple[Sensitivity, ...], dict[str
     sd = np.sqrt(np.diag(covariance))
     safe = np.where(sd > 0.0, sd, 1.0)
     correlation = covariance / np.outer(safe, safe)
-    found, explained = [], {}
+    sensitivities, explained = [], {}
     shares = [between_share(groups) for groups in first.bins]
-    for a, answer in enumerate(ANSWERS):
-        j = k + SPREADS.index(answer)
+    for a, result in enumerate(MAIN_RESULTS):
+        j = k + SPREADS.index(result)
         if sd[j] <= 0.0:
             continue
         slopes = np.linalg.lstsq(correlation[:k, :k], correlation[:k, j], rcond=None)[0]
-        explained[answer] = float(min(slopes @ correlation[:k, j], 1.0))
+        explained[result] = float(min(slopes @ correlation[:k, j], 1.0))
         for i, q in enumerate(first.inputs):
-            found.append(
+            sensitivities.append(
                 Sensitivity(
                     quantity=q.name,
-                    answer=answer,
+                    result=result,
                     slope=float(slopes[i] * sd[j] / safe[i]),
                     correlation=float(slopes[i]),
                     first_order=float(shares[i][a]) if shares else None,
                 )
             )
-    return tuple(found), explained
+    return tuple(sensitivities), explained
 
 
-def _best(question: Study, grid: GroupMeans) -> tuple[Best, ...]:
+def _best(study: Study, grid: GroupMeans) -> tuple[Best, ...]:
     if not grid.n.any():
         return ()
     mean, variance = grid.mean, grid.variance
-    found = []
-    for answer in ('range_m', 'time_s'):
-        j = ANSWERS.index(answer)
+    best = []
+    for result in ('range_m', 'time_s'):
+        j = MAIN_RESULTS.index(result)
         point = int(np.nanargmax(mean[:, j]))
-        places = np.unravel_index(point, question.shape)
+        places = np.unravel_index(point, study.shape)
         values = {
             name: float(values[int(place)])
-            for (name, values), place in zip(question.vary.items(), places, strict=True)
+            for (name, values), place in zip(study.vary.items(), places, strict=True)
         }
         sd = float(np.sqrt(np.nan_to_num(variance[point, j])))
-        found.append(Best(answer, values, float(mean[point, j]), sd, point))
-    return tuple(found)
+        best.append(Best(result, values, float(mean[point, j]), sd, point))
+    return tuple(best)

@@ -1,4 +1,4 @@
-"""Flights as tables: Parquet and CSV, written and read in pieces so that memory stays flat."""
+"""Tables of flights: Parquet and CSV, written and read in chunks to limit the memory."""
 
 from collections.abc import Iterator, Sequence
 import json
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 Columns = dict[str, NDArray[Any]]
 SUFFIXES = ('.parquet', '.csv')
 METADATA_KEY = b'disc_sim_ros'
-_ROWS = 65536  # read at a time
+_ROWS = 65536  # least rows of a chunk
 
 
 def parquet_bytes(columns: Columns) -> bytes:
-    """Return flights as the bytes of a Parquet file of one row group."""
+    """Return flights as the bytes of a Parquet file with one row group."""
     import pyarrow as pa  # noqa: PLC0415 - takes a quarter of a second
     from pyarrow import parquet  # noqa: PLC0415
 
@@ -34,14 +34,15 @@ def parquet_bytes(columns: Columns) -> bytes:
     return content
 
 
-def join(parts: Sequence[Path], target: Path, suffix: str, question: Study) -> None:
-    """Write the flights of `parts` to one file, a part at a time.
+def join(parts: Sequence[Path], target: Path, suffix: str, study: Study) -> None:
+    """Write the flights of `parts` to one file, one part at a time.
 
     Args:
         parts: Parquet files, in order.
-        target: What to write.
+        target: File to write.
         suffix: '.parquet' (one row group for each part) or '.csv' (one header line).
-        question: Goes into the metadata of Parquet; beside a CSV file, into a file NAME.json.
+        study: Study of the flights; stored in the metadata of a Parquet file, and in NAME.json
+            beside a CSV file.
 
     Raises:
         OSError: The system refuses.
@@ -55,7 +56,7 @@ def join(parts: Sequence[Path], target: Path, suffix: str, question: Study) -> N
             for path in parts:
                 csv.write_csv(_plain(parquet.read_table(path)), file, options)
         else:
-            schema = parquet.read_schema(parts[0]).with_metadata(_metadata(question))
+            schema = parquet.read_schema(parts[0]).with_metadata(_metadata(study))
             with parquet.ParquetWriter(file, schema, compression='zstd') as writer:
                 for path in parts:
                     table = parquet.read_table(path)
@@ -63,16 +64,16 @@ def join(parts: Sequence[Path], target: Path, suffix: str, question: Study) -> N
         file.flush()
         os.fsync(file.fileno())
     if suffix == '.csv':
-        text = json.dumps(study_document(question), indent=1)
+        text = json.dumps(study_document(study), indent=1)
         sidecar(target.with_name(target.name.removesuffix('.joining'))).write_text(
             text, encoding='utf-8'
         )
 
 
 def chunks(path: Path, names: Sequence[str]) -> Iterator[Columns]:
-    """Yield the flights of a file, some thousand at a time: the columns of `names`.
+    """Yield the columns `names` of the flights of a file, some thousand flights at a time.
 
-    `status` comes as numbers, an index of `quantities.STATUS`.
+    `status` is given as numbers, an index of `columns.STATUS`.
     """
     if path.suffix.lower() == '.csv':
         from pyarrow import csv  # noqa: PLC0415
@@ -85,13 +86,13 @@ def chunks(path: Path, names: Sequence[str]) -> Iterator[Columns]:
     from pyarrow import parquet  # noqa: PLC0415
 
     with parquet.ParquetFile(path) as file:
-        # Not iter_batches, which keeps in memory what it has read.
+        # Not iter_batches: it keeps every row that it has read in memory.
         for groups in _row_groups(file.metadata):
             yield _numbers(file.read_row_groups(groups, columns=list(names)), names)
 
 
 def stored_study(path: Path) -> dict[str, Any] | None:
-    """Return the document of the question that a finished file answers; None if it has none."""
+    """Return the document of the study of a finished file; None if it holds none."""
     try:
         if path.suffix.lower() == '.csv':
             text: bytes | None = sidecar(path).read_bytes()
@@ -99,19 +100,19 @@ def stored_study(path: Path) -> dict[str, Any] | None:
             from pyarrow import parquet  # noqa: PLC0415
 
             text = (parquet.read_schema(path).metadata or {}).get(METADATA_KEY)
-        found: dict[str, Any] | None = json.loads(text) if text else None
+        document: dict[str, Any] | None = json.loads(text) if text else None
     except (OSError, ValueError):  # pyarrow.ArrowInvalid is a ValueError
         return None
-    return found
+    return document
 
 
 def sidecar(path: Path) -> Path:
-    """Return the file beside a CSV file that holds its question."""
+    """Return the path of the file that holds the study of a CSV file."""
     return path.with_name(f'{path.name}.json')
 
 
 def rows_of(path: Path) -> int:
-    """Return how many flights a Parquet file holds; -1 for one that is damaged."""
+    """Return the number of flights in a Parquet file; -1 if it is damaged."""
     from pyarrow import parquet  # noqa: PLC0415
 
     try:
@@ -133,7 +134,7 @@ def _arrow(columns: Columns) -> 'pa.Table':
 
 
 def _plain(table: 'pa.Table') -> 'pa.Table':
-    """Return a table with the status in words, as CSV needs it."""
+    """Return a table with the status as words, for CSV."""
     import pyarrow as pa  # noqa: PLC0415
 
     place = table.schema.get_field_index('status')
@@ -141,7 +142,7 @@ def _plain(table: 'pa.Table') -> 'pa.Table':
 
 
 def _row_groups(metadata: Any) -> Iterator[list[int]]:
-    """Yield the row groups of a file, as many at a time as make up some thousand rows."""
+    """Yield consecutive row groups that together have at least `_ROWS` rows."""
     groups: list[int] = []
     rows = 0
     for i in range(metadata.num_row_groups):
@@ -155,18 +156,18 @@ def _row_groups(metadata: Any) -> Iterator[list[int]]:
 def _numbers(batch: 'pa.Table | pa.RecordBatch', names: Sequence[str]) -> Columns:
     import pyarrow as pa  # noqa: PLC0415
 
-    found: Columns = {}
+    columns: Columns = {}
     for name in names:
         column = batch.column(batch.schema.get_field_index(name))
         if name == 'status':
             words = np.asarray(column.cast(pa.string()).to_pylist(), dtype=str)
-            found[name] = sum(
+            columns[name] = sum(
                 (i * (words == word) for i, word in enumerate(STATUS)), np.zeros(len(words), int)
             )
         else:
-            found[name] = np.asarray(column)
-    return found
+            columns[name] = np.asarray(column)
+    return columns
 
 
-def _metadata(question: Study) -> dict[bytes, bytes]:
-    return {METADATA_KEY: json.dumps(study_document(question)).encode()}
+def _metadata(study: Study) -> dict[bytes, bytes]:
+    return {METADATA_KEY: json.dumps(study_document(study)).encode()}

@@ -1,4 +1,4 @@
-"""`sweep` and `optimise` as their users meet them: what they print, write and refuse."""
+"""`sweep` and `optimise` as commands: what they print, write and refuse."""
 
 import json
 import os
@@ -45,11 +45,11 @@ def test_help_has_every_quantity_with_its_unit(capsys):
         assert ended.value.code == 0
         text = ' '.join(capsys.readouterr().out.split())
         assert text.startswith('usage')
-        told = [f'{q.name} ({q.unit})' if q.unit else q.name for q in VARIED.values()]
-        assert [word for word in told if word not in text] == []
+        named = [f'{q.name} ({q.unit})' if q.unit else q.name for q in VARIED.values()]
+        assert [word for word in named if word not in text] == []
 
 
-def test_a_grid_is_told_written_and_drawn(capsys):
+def test_a_grid_is_summarised_written_and_plotted(capsys):
     line = '--vary pitch=0:30:5 --vary roll=-10:10/3 --step 0.02 --plot a.png --output a.parquet'
     assert sweep.main(shlex.split(line)) == 0
     out = capsys.readouterr().out
@@ -69,8 +69,8 @@ def test_json_is_one_document_that_agrees_with_the_file(capsys):
     assert sweep.main(shlex.split(line)) == 0
     document = json.loads(capsys.readouterr().out)
     table = parquet.read_table('b.parquet')
-    found = table['range_m'].to_numpy()
-    assert document['results']['range_m']['mean'] == pytest.approx(found.mean(), rel=1e-9)
+    ranges = table['range_m'].to_numpy()
+    assert document['results']['range_m']['mean'] == pytest.approx(ranges.mean(), rel=1e-9)
     assert document['counts']['landed'] == 500
     assert document['question']['fixed']['speed'] == 15.0
     assert document['question']['scatter']['pitch'] == {'normal': [None, 2.0]}
@@ -83,7 +83,7 @@ def test_json_is_one_document_that_agrees_with_the_file(capsys):
 @pytest.mark.parametrize(
     ('line', 'words'),
     [
-        ('', '--vary: .nothing'),
+        ('', 'all flights would be the same; give --vary'),
         ('--vary pitch=10:0:1', 'the grid is empty'),
         ('--vary pitch=0:10:0', 'the grid is empty'),
         ('--vary pitch=0:10', 'START:STOP:STEP'),
@@ -102,7 +102,7 @@ def test_json_is_one_document_that_agrees_with_the_file(capsys):
         ('--normal speed=20,1 --uniform speed=1,2', 'scatters twice'),
         ('--vary speed=10,20 --normal speed=20,1', 'varied already'),
         ('--uniform pitch=5,4', 'high'),
-        ('--scatter pitch=2 --correlation pitch,speed=0.5', 'only what scatters'),
+        ('--scatter pitch=2 --correlation pitch,speed=0.5', 'only scattered quantities'),
         ('--scatter pitch=2 --scatter roll=2 --correlation pitch,roll=1.5', 'from -1 to 1'),
         ('--scatter pitch=2 --correlation pitch=0.5', 'A,B=R'),
         ('--scatter pitch=2 --count 0', 'whole number from 1'),
@@ -118,14 +118,14 @@ def test_json_is_one_document_that_agrees_with_the_file(capsys):
         ('--vary spin=30,900 --step 0.02', 'at most'),
     ],
 )
-def test_bad_input_is_one_line(line, words, capsys, folder):
+def test_bad_input_is_refused_in_one_line(line, words, capsys, folder):
     error = refused(sweep, line, capsys)
     assert error.startswith('sweep: error: ')
     assert re.search(words, error), error
     assert list(folder.iterdir()) == []
 
 
-def test_an_existing_file_stays(capsys, folder):
+def test_an_existing_file_is_overwritten_only_with_force(capsys, folder):
     (folder / 'sweep.parquet').write_text('mine')
     assert '--force' in refused(sweep, '--vary pitch=1,2', capsys)
     assert (folder / 'sweep.parquet').read_text() == 'mine'
@@ -133,7 +133,7 @@ def test_an_existing_file_stays(capsys, folder):
     assert parquet.read_metadata('sweep.parquet').num_rows == 2
 
 
-def test_ctrl_c_keeps_what_is_finished_and_resume_ends_it(folder, capsys):
+def test_ctrl_c_keeps_finished_flights_and_resume_refuses_another_study(folder, capsys):
     words = ['--scatter', 'pitch=2', '--count', '20000', '--batch', '200', '--step', '0.002',
              '--output', 'c.csv']  # fmt: skip
     leader, follower = pty.openpty()
@@ -156,19 +156,19 @@ def test_ctrl_c_keeps_what_is_finished_and_resume_ends_it(folder, capsys):
         os.close(leader)
     text = shown.decode()
     assert re.search(r'\[#*\.+\] +\d+% \d+ of 20000 flights, \d+/s, .* left', text)
-    told = re.search(r'sweep: stopped; (\d+) of 20000 flights are kept in c.csv.parts', text)
+    stopped = re.search(r'sweep: stopped; (\d+) of 20000 flights are kept in c.csv.parts', text)
     assert 'Traceback' not in text
     parts = list((folder / 'c.csv.parts').glob('*.parquet'))
-    assert int(told[1]) == 200 * len(parts)
+    assert int(stopped[1]) == 200 * len(parts)
     assert not (folder / 'c.csv').exists()
     changed = [*words[:-6], '--batch', '200', '--step', '0.005', '--output', 'c.csv', '--resume']
     assert 'step 0.002, now 0.005' in refused(sweep, shlex.join(changed), capsys)
-    # With fewer left to fly, the same answer comes: the question holds the count.
+    # A smaller count is refused as well: the count belongs to the study.
     smaller = [*words, '--resume', '--count', '400']
     assert 'count 20000, now 400' in refused(sweep, shlex.join(smaller), capsys)
 
 
-def test_resume_of_a_finished_sweep_tells_it_again(capsys):
+def test_resume_of_a_finished_sweep_prints_the_same_summary(capsys):
     words = ['--scatter', 'pitch=2', '--count', '300', '--step', '0.02']
     assert sweep.main(words) == 0
     first = capsys.readouterr().out.splitlines()
@@ -177,16 +177,16 @@ def test_resume_of_a_finished_sweep_tells_it_again(capsys):
     assert again[:-1] == first[:-1]
 
 
-def test_optimise_tells_a_launch_that_fly_flies(capsys):
+def test_fly_repeats_the_flight_that_optimise_prints(capsys):
     line = '--limit pitch=0:40 --speed 15 --spin 31 --roll 0 --wind 2 0 0 --step 0.02 --plot o.png'
     assert optimise.main(shlex.split(line)) == 0
     out = capsys.readouterr().out
-    told = float(re.search(r'flight +(\d+\.\d+) m', out)[1])
+    printed = float(re.search(r'flight +(\d+\.\d+) m', out)[1])
     command = shlex.split(re.search(r'again +(fly .*)', out)[1])
     assert Path('o.png').read_bytes().startswith(b'\x89PNG')
     assert fly.main([*command[1:], '--json']) == 0
     flown = json.loads(capsys.readouterr().out)
-    assert flown['range_m'] == pytest.approx(told, abs=5e-3)  # told with two digits
+    assert flown['range_m'] == pytest.approx(printed, abs=5e-3)  # printed with two digits
     assert flown['launch']['wind_m_s'] == [2.0, 0.0, 0.0]
 
 
@@ -199,18 +199,18 @@ def test_optimise_tells_a_launch_that_fly_flies(capsys):
         ('--limit pitch=10:5', 'the lower first'),
         ('--limit pitch=5', 'NAME=LOW:HIGH'),
         ('--limit mass=0.1:0.2', '--limit'),
-        ('--percentile 10', 'nothing scatters'),
+        ('--percentile 10', 'no quantity scatters'),
         ('--for beauty', 'invalid choice'),
         ('--speed 15 --spin 31 --pitch 5 --roll 0', 'at least one'),
     ],
 )
-def test_bad_input_of_optimise_is_one_line(line, words, capsys):
+def test_bad_input_of_optimise_is_refused_in_one_line(line, words, capsys):
     error = refused(optimise, line, capsys)
     assert error.startswith('optimise: error: ')
     assert words in error
 
 
-def test_the_progress_line_is_true():
+def test_the_progress_line_has_share_rate_and_time_left():
     text = progress_text(250, 1000, 100, 2.0)
     assert text == '[######..................]  25% 250 of 1000 flights, 50/s, 15 s left'
     assert [duration(x) for x in (8.4, 200.0, 7500.0)] == ['8 s', '3 min 20 s', '2 h 5 min']

@@ -1,4 +1,4 @@
-"""Optima: known ones, none better in a fine grid, the same again, and as `fly` flies them."""
+"""Optima: against known ones and fine grids, repeatable, and as `fly` computes them."""
 
 import math
 import shlex
@@ -29,28 +29,28 @@ VACUUM = Setup(disc=FRISBEE, step=0.02, air=Air(density=0.0))
 
 @pytest.fixture(scope='module')
 def windy():
-    question = Study(setup=Setup(disc=FRISBEE, step=0.02, wind=Wind(mean=(-3.0, 0.0, 0.0))))
-    return optimise(Problem(question=question, limits={'pitch': (-5.0, 40.0), 'roll': (-30, 30)}))
+    study = Study(setup=Setup(disc=FRISBEE, step=0.02, wind=Wind(mean=(-3.0, 0.0, 0.0))))
+    return optimise(Problem(study=study, limits={'pitch': (-5.0, 40.0), 'roll': (-30, 30)}))
 
 
-def test_without_air_45_degrees_reach_furthest():
-    found = optimise(Problem(question=Study(setup=VACUUM), limits={'pitch': (0.0, 90.0)}))
+def test_without_air_45_degrees_has_the_greatest_range():
+    optimum = optimise(Problem(study=Study(setup=VACUUM), limits={'pitch': (0.0, 90.0)}))
     # The range is flat to 1e-7 m within 0.003 degrees of the best.
-    assert found.launch['pitch'] == pytest.approx(45.0, abs=0.01)
-    assert found.value == pytest.approx(15.0**2 / 9.81, rel=1e-9)
+    assert optimum.launch['pitch'] == pytest.approx(45.0, abs=0.01)
+    assert optimum.value == pytest.approx(15.0**2 / 9.81, rel=1e-9)
     # cos(2 (pitch - 45)) is 0.99 at 4.05 degrees; the line has 161 points.
-    assert found.flat['pitch'] == pytest.approx((45 - 4.05, 45 + 4.05), abs=90 / 160)
-    assert found.at_limit == ()
+    assert optimum.flat['pitch'] == pytest.approx((45 - 4.05, 45 + 4.05), abs=90 / 160)
+    assert optimum.at_limit == ()
 
 
-def test_without_air_straight_up_flies_longest_and_speed_is_held_by_its_limit():
+def test_without_air_straight_up_flies_longest_and_the_speed_is_at_its_limit():
     limits = {'pitch': (0.0, 90.0), 'speed': (5.0, 20.0)}
-    found = optimise(Problem(question=Study(setup=VACUUM), limits=limits, goal='time'))
-    assert found.value == pytest.approx(2 * 20.0 / 9.81, rel=1e-6)
-    assert set(found.at_limit) == {'pitch', 'speed'}
+    optimum = optimise(Problem(study=Study(setup=VACUUM), limits=limits, goal='time'))
+    assert optimum.value == pytest.approx(2 * 20.0 / 9.81, rel=1e-6)
+    assert set(optimum.at_limit) == {'pitch', 'speed'}
 
 
-def test_a_fine_grid_around_the_optimum_finds_nothing_better(windy):
+def test_no_point_of_a_fine_grid_is_better_than_the_optimum(windy):
     pitch, roll = (windy.launch[name] for name in ('pitch', 'roll'))
     step = np.linspace(-1.0, 1.0, 41)
     grid = np.array([(pitch + a, roll + b) for a in step for b in step])
@@ -60,13 +60,13 @@ def test_a_fine_grid_around_the_optimum_finds_nothing_better(windy):
     assert windy.problem.values(np.array(coarse), 1).max() <= windy.value + 5e-3
 
 
-def test_the_same_seed_finds_the_same_launch_and_another_the_same_best(windy):
+def test_the_same_seed_gives_the_same_launch_and_another_the_same_value(windy):
     assert optimise(windy.problem).launch == windy.launch
     assert optimise(windy.problem, seed=1).value == pytest.approx(windy.value, abs=5e-3)
 
 
-def test_the_command_flies_the_optimum_again(windy):
-    words = shlex.split(optimise_report.command(windy, 'frisbee'))
+def test_the_command_repeats_the_flight_of_the_optimum(windy):
+    words = shlex.split(optimise_report.fly_command(windy, 'frisbee'))
     assert words[0] == 'fly'
     chosen = fly_program.parser().parse_args(words[1:])
     release, setup = flags.thrown(chosen)
@@ -74,7 +74,7 @@ def test_the_command_flies_the_optimum_again(windy):
     assert optimise_report.still_flight(windy).range == pytest.approx(windy.value, rel=1e-9)
 
 
-def test_within_the_flat_range_the_result_stays_and_beyond_it_does_not(windy):
+def test_the_result_is_flat_within_the_flat_range_and_not_beyond(windy):
     for j, name in enumerate(windy.problem.free):
         low, high = windy.flat[name]
         launches = np.tile(list(windy.launch.values()), (3, 1))
@@ -87,20 +87,20 @@ def test_within_the_flat_range_the_result_stays_and_beyond_it_does_not(windy):
 
 @pytest.fixture(scope='module')
 def aimed():
-    question = Study(
+    study = Study(
         setup=SETUP, sampling='sobol', count=16,
         scatter={'speed': Normal(0.5), 'pitch': Normal(1.5), 'yaw': Normal(1.5)},
     )  # fmt: skip
     limits = {'pitch': (0.0, 40.0), 'yaw': (-45.0, 45.0)}
-    return optimise(Problem(question=question, limits=limits, goal='accuracy', target=(20.0, 4.0)))
+    return optimise(Problem(study=study, limits=limits, goal='accuracy', target=(20.0, 4.0)))
 
 
 def test_scattered_throws_gather_around_the_target(aimed):
-    question = aimed.question
+    study = aimed.study
     throws = aimed.problem.landings(np.array([list(aimed.launch.values())]), 16)
     distance = np.hypot(throws.x - 20.0, throws.y - 4.0)
     assert distance.mean() == pytest.approx(aimed.value, rel=1e-12)
-    assert question.launch.pitch == aimed.launch['pitch']
+    assert study.launch.pitch == aimed.launch['pitch']
     # A degree and a half of yaw alone misses by 0.5 m at 20 m.
     assert 0.4 < aimed.value < 2.0
     nearby = np.array(list(aimed.launch.values())) + np.random.default_rng(0).normal(
@@ -110,19 +110,19 @@ def test_scattered_throws_gather_around_the_target(aimed):
     assert aimed.problem.values(np.clip(nearby, low, high), 16).min() >= aimed.value - 5e-3
 
 
-def test_a_percentile_is_made_best_where_it_is_asked():
-    question = Study(setup=VACUUM, sampling='sobol', count=64, scatter={'speed': Normal(1.0)})
-    found = optimise(Problem(question=question, limits={'pitch': (0.0, 90.0)}, percentile=10.0))
+def test_a_percentile_is_optimised_if_given():
+    study = Study(setup=VACUUM, sampling='sobol', count=64, scatter={'speed': Normal(1.0)})
+    optimum = optimise(Problem(study=study, limits={'pitch': (0.0, 90.0)}, percentile=10.0))
     # Without air the range is a rising function of the speed, so its 10 % is that of the speed.
-    speed = np.percentile(question.values(0, 64)['speed'] ** 2, 10.0)
-    assert found.value == pytest.approx(speed / 9.81, rel=1e-6)
+    speed = np.percentile(study.values(0, 64)['speed'] ** 2, 10.0)
+    assert optimum.value == pytest.approx(speed / 9.81, rel=1e-6)
 
 
-def test_texts_document_and_plot_tell_the_same(aimed, windy):
+def test_text_document_and_plot_agree(aimed, windy):
     document = optimise_report.optimum_document(aimed, 'fly')
     assert document['launch'].keys() == {'pitch_deg', 'yaw_deg'}
     assert document['value'] == aimed.value
-    text = optimise_report.text(aimed, 'fly --pitch 1')
+    text = optimise_report.optimum_text(aimed, 'fly --pitch 1')
     assert f'mean {aimed.results.mean():.2f}' in text
     assert 'again    fly --pitch 1' in text
     page = figure(aimed)
@@ -139,21 +139,21 @@ def test_texts_document_and_plot_tell_the_same(aimed, windy):
         ({'goal': 'accuracy'}, 'needs a target'),
         ({'target': (1.0, 2.0)}, 'only accuracy'),
         ({'limits': {}}, 'at least one'),
-        ({'limits': {'pitch': (5.0, 5.0)}}, 'the lower first'),
+        ({'limits': {'pitch': (5.0, 5.0)}}, 'the lower limit first'),
         ({'limits': {'speed': (-5.0, 5.0)}}, 'from 0 to 200'),
-        ({'percentile': 10.0}, 'nothing scatters'),
+        ({'percentile': 10.0}, 'no quantity scatters'),
         ({'goal': 'beauty'}, 'choose from range'),
     ],
 )
 def test_contradictions_are_refused(changes, message):
     with pytest.raises(ConfigError, match=message):
-        Problem(**({'question': Study(setup=SETUP), 'limits': {'pitch': (0.0, 9.0)}} | changes))
+        Problem(**({'study': Study(setup=SETUP), 'limits': {'pitch': (0.0, 9.0)}} | changes))
 
 
-def test_a_launch_from_an_advance_ratio_keeps_it():
-    question = Study(setup=SETUP, advance_ratio=0.3)
-    found = optimise(Problem(question=question, limits={'speed': (10.0, 15.0)}))
-    spin = 2.0 * found.launch['speed'] * 0.3 / FRISBEE.diameter
-    again = fly(Launch(speed=found.launch['speed'], spin=spin), SETUP)
-    assert again.range == pytest.approx(found.value, rel=1e-9)
-    assert math.isclose(optimise_report.still_launch(found.question).spin, spin)
+def test_a_given_advance_ratio_is_kept():
+    study = Study(setup=SETUP, advance_ratio=0.3)
+    optimum = optimise(Problem(study=study, limits={'speed': (10.0, 15.0)}))
+    spin = 2.0 * optimum.launch['speed'] * 0.3 / FRISBEE.diameter
+    again = fly(Launch(speed=optimum.launch['speed'], spin=spin), SETUP)
+    assert again.range == pytest.approx(optimum.value, rel=1e-9)
+    assert math.isclose(optimise_report.still_launch(optimum.study).spin, spin)

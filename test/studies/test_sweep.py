@@ -1,4 +1,4 @@
-"""Ensembles: the flights of `fly`, the same for any executor, and never lost once finished."""
+"""Sweeps: the flights of `fly`, the same for any executor, and kept once they are finished."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import contextlib
@@ -34,7 +34,7 @@ from disc_sim_ros.studies.study import Study
 
 FRISBEE = disc_file.load_disc('frisbee')
 SETUP = Setup(disc=FRISBEE, step=0.02)
-QUESTION = Study(
+STUDY = Study(
     setup=SETUP,
     scatter={'speed': Normal(1.0, 15.0), 'pitch': Normal(2.0), 'spin': Normal(2.0, 31.0)},
     correlations={('speed', 'spin'): 0.5},
@@ -45,13 +45,13 @@ QUESTION = Study(
 
 @pytest.fixture(scope='module')
 def expected() -> tables.Columns:
-    return collect(QUESTION)
+    return collect(STUDY)
 
 
-def assert_same(found: tables.Columns, expected: tables.Columns) -> None:
-    assert list(found) == list(expected)
+def assert_same(actual: tables.Columns, expected: tables.Columns) -> None:
+    assert list(actual) == list(expected)
     for name, values in expected.items():
-        assert_array_equal(found[name], values, err_msg=name)
+        assert_array_equal(actual[name], values, err_msg=name)
 
 
 def read(path: Path) -> tables.Columns:
@@ -61,39 +61,41 @@ def read(path: Path) -> tables.Columns:
     return {name: np.concatenate([piece[name] for piece in pieces]) for name in names}
 
 
-# ---- what is flown ----
+# ---- flights ----
 
 
-def test_each_flight_is_the_one_that_fly_computes():
+def test_each_flight_is_the_same_as_that_of_fly():
     setup = Setup(
         disc=FRISBEE, step=0.01, wind=Wind(mean=(2.0, -1.0, 0.0), turbulence=4.0, seed=9)
     )
-    question = Study(
+    study = Study(
         setup=setup, launch=Launch(height=1.2), control=Control(C_M=0.002),
         vary={'pitch': [5.0, 12.0]}, scatter={'speed': Normal(2.0), 'yaw': Uniform(-20.0, 20.0)},
         count=3,
     )  # fmt: skip
-    found = collect(question)
+    flights = collect(study)
     for i in range(6):
-        wind = Wind(mean=(2.0, -1.0, 0.0), turbulence=4.0, seed=int(found['gust_seed'][i]))
+        wind = Wind(mean=(2.0, -1.0, 0.0), turbulence=4.0, seed=int(flights['gust_seed'][i]))
         launch = Launch(
-            speed=found['speed_m_s'][i], pitch=found['pitch_deg'][i], yaw=found['yaw_deg'][i],
-            height=1.2,
+            speed=flights['speed_m_s'][i], pitch=flights['pitch_deg'][i],
+            yaw=flights['yaw_deg'][i], height=1.2,
         )  # fmt: skip
-        alone = fly(launch, Setup(disc=FRISBEE, step=0.01, wind=wind), control=question.control)
-        row = [found[name][i] for name in ('time_s', 'x_m', 'y_m', 'range_m', 'drift_m', 'apex_m')]
+        alone = fly(launch, Setup(disc=FRISBEE, step=0.01, wind=wind), control=study.control)
+        row = [
+            flights[name][i] for name in ('time_s', 'x_m', 'y_m', 'range_m', 'drift_m', 'apex_m')
+        ]
         one = [alone.time, *alone.position[:2], alone.range, alone.drift, alone.apex]
         # The two are compiled apart, and may round differently in the last bits.
         assert_allclose(row, one, rtol=1e-9, atol=1e-9)
-        assert found['end_spin_rad_s'][i] == pytest.approx(alone.end.r, rel=1e-9)
+        assert flights['end_spin_rad_s'][i] == pytest.approx(alone.end.r, rel=1e-9)
 
 
 def test_an_advance_ratio_follows_the_speed():
-    found = collect(Study(setup=SETUP, vary={'speed': [10.0, 16.0]}, advance_ratio=0.3))
+    flights = collect(Study(setup=SETUP, vary={'speed': [10.0, 16.0]}, advance_ratio=0.3))
     for i, speed in enumerate((10.0, 16.0)):
         spin = 2.0 * speed * 0.3 / FRISBEE.diameter
         alone = fly(Launch(speed=speed, spin=spin), SETUP)
-        assert found['range_m'][i] == pytest.approx(alone.range, rel=1e-9)
+        assert flights['range_m'][i] == pytest.approx(alone.range, rel=1e-9)
     varied = collect(Study(setup=SETUP, vary={'advance_ratio': [0.3]}))
     assert varied['range_m'][0] == pytest.approx(
         fly(Launch(spin=2.0 * 15.0 * 0.3 / FRISBEE.diameter), SETUP).range, rel=1e-9
@@ -101,7 +103,7 @@ def test_an_advance_ratio_follows_the_speed():
 
 
 def test_the_wind_and_the_disc_can_be_varied():
-    found = collect(Study(setup=SETUP, vary={'wind_x': [-3.0, 3.0], 'mass': [0.15, 0.175]}))
+    flights = collect(Study(setup=SETUP, vary={'wind_x': [-3.0, 3.0], 'mass': [0.15, 0.175]}))
     for i, (x, mass) in enumerate(((-3.0, 0.15), (-3.0, 0.175), (3.0, 0.15), (3.0, 0.175))):
         keys = disc_file.disc_document(FRISBEE) | {'mass_kg': mass}
         setup = Setup(
@@ -109,7 +111,7 @@ def test_the_wind_and_the_disc_can_be_varied():
             step=0.02,
             wind=Wind(mean=(x, 0.0, 0.0)),
         )
-        assert found['x_m'][i] == pytest.approx(fly(Launch(), setup).position[0], rel=1e-9)
+        assert flights['x_m'][i] == pytest.approx(fly(Launch(), setup).position[0], rel=1e-9)
 
 
 @pytest.mark.parametrize('name', ['frisbee', 'wraith'])
@@ -122,50 +124,50 @@ def test_the_chosen_step_lands_within_a_millimetre(name):
     assert step * spin * disc.inertia_axial / disc.inertia_diametral < TURN
     ends = []
     for h in (step, 5e-4):
-        question = Study(setup=Setup(disc=disc, step=h), launch=launch, vary=grid)
-        found = collect(question)
-        ends.append(np.stack([found['x_m'], found['y_m']]))
+        study = Study(setup=Setup(disc=disc, step=h), launch=launch, vary=grid)
+        flights = collect(study)
+        ends.append(np.stack([flights['x_m'], flights['y_m']]))
     assert np.abs(ends[0] - ends[1]).max() < 1e-3
 
 
-# ---- the same for any workers ----
+# ---- executors ----
 
 
 @pytest.mark.parametrize('batch', [37, 599, 8192])
-def test_batches_change_nothing(expected, batch):
-    assert_same(collect(QUESTION, batch=batch), expected)
+def test_the_flights_do_not_depend_on_the_batch(expected, batch):
+    assert_same(collect(STUDY, batch=batch), expected)
 
 
-def test_threads_of_an_executor_change_nothing(expected):
+def test_the_flights_are_the_same_in_threads_of_an_executor(expected):
     with ThreadPoolExecutor(3) as pool:
-        assert_same(collect(QUESTION, executor=pool, batch=50), expected)
+        assert_same(collect(STUDY, executor=pool, batch=50), expected)
 
 
-def test_processes_change_nothing(expected, tmp_path):
+def test_the_flights_are_the_same_in_processes(expected, tmp_path):
     with executors.opened('processes', 2) as (pool, workers):
         assert workers == 2
-        path = sweep(QUESTION, tmp_path / 'a.parquet', executor=pool, batch=50)
+        path = sweep(STUDY, tmp_path / 'a.parquet', executor=pool, batch=50)
     assert_same(read(path), expected)
 
 
-def test_a_dask_cluster_changes_nothing(expected):
+def test_the_flights_are_the_same_in_a_dask_cluster(expected):
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # Dask's own, about sockets and its dashboard
         with executors.opened('dask', 2) as (pool, workers):
             assert type(pool).__name__ == 'ClientExecutor'
             assert workers == 2
-            assert_same(collect(QUESTION, executor=pool, batch=50), expected)
+            assert_same(collect(STUDY, executor=pool, batch=50), expected)
 
 
 @pytest.mark.filterwarnings('ignore')  # Dask's own
-def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_reported_in_one_line(monkeypatch):
     monkeypatch.setattr(executors, '_PATIENCE', 0.5)
     opening = executors.opened('dask=tcp://127.0.0.1:9')
     with pytest.raises(ConfigError, match='no scheduler answers'):
         opening.__enter__()
 
 
-def test_an_error_of_a_worker_comes_home_as_it_was():
+def test_an_error_of_a_worker_survives_pickling():
     error = pickle.loads(pickle.dumps(ConfigError('step', 0.02, 'at most 0.01 s')))
     assert (error.thing, error.value, error.allowed) == ('step', 0.02, 'at most 0.01 s')
     assert str(error) == 'step: 0.02 is not allowed; at most 0.01 s'
@@ -175,8 +177,8 @@ def test_an_error_of_a_worker_comes_home_as_it_was():
 
 
 @pytest.mark.parametrize('name', ['a.parquet', 'a.csv'])
-def test_a_file_holds_every_flight_and_the_whole_question(expected, tmp_path, name):
-    path = sweep(QUESTION, tmp_path / name, batch=256)
+def test_a_file_holds_every_flight_and_the_whole_study(expected, tmp_path, name):
+    path = sweep(STUDY, tmp_path / name, batch=256)
     assert_same(read(path), expected)
     assert not path.with_name(f'{name}.parts').exists()
     stored = tables.stored_study(path)
@@ -187,7 +189,7 @@ def test_a_file_holds_every_flight_and_the_whole_question(expected, tmp_path, na
 
 
 def test_parquet_has_units_words_and_a_row_group_for_each_batch(tmp_path):
-    path = sweep(QUESTION, tmp_path / 'a.parquet', batch=256)
+    path = sweep(STUDY, tmp_path / 'a.parquet', batch=256)
     with parquet.ParquetFile(path) as file:
         assert file.num_row_groups == 3
         table = file.read()
@@ -195,15 +197,15 @@ def test_parquet_has_units_words_and_a_row_group_for_each_batch(tmp_path):
     assert table['index'].to_pylist() == list(range(600))
 
 
-def test_nothing_is_overwritten_unasked(tmp_path):
-    path = sweep(QUESTION, tmp_path / 'a.parquet')
+def test_an_existing_file_is_overwritten_only_with_force(tmp_path):
+    path = sweep(STUDY, tmp_path / 'a.parquet')
     before = path.read_bytes()
     with pytest.raises(ConfigError, match='--force'):
-        sweep(QUESTION, path)
+        sweep(STUDY, path)
     assert path.read_bytes() == before
-    assert sweep(QUESTION, path, resume=True).read_bytes() == before  # done already
+    assert sweep(STUDY, path, resume=True).read_bytes() == before  # already finished
     other = Study(setup=SETUP, vary={'pitch': [1.0, 2.0]})
-    with pytest.raises(ConfigError, match='differs'):
+    with pytest.raises(ConfigError, match='holds another study'):
         sweep(other, path, resume=True)
     assert sweep(other, path, force=True).stat().st_size != len(before)
 
@@ -212,50 +214,50 @@ def test_nothing_is_overwritten_unasked(tmp_path):
 
 
 def stopped_sweep(path: Path, *, after: int) -> None:
-    """Begin to fly, and press Ctrl-C when `after` flights are kept."""
+    """Start a sweep, and press Ctrl-C when `after` flights are kept."""
 
     def progress(done: int, total: int) -> None:
         if done >= after:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sweep(QUESTION, path, batch=50, progress=progress)
+        sweep(STUDY, path, batch=50, progress=progress)
 
 
-def test_a_resumed_sweep_keeps_its_flights_and_ends_as_if_nothing_had_been(expected, tmp_path):
+def test_a_resumed_sweep_keeps_its_flights_and_ends_as_an_uninterrupted_one(expected, tmp_path):
     path = tmp_path / 'a.parquet'
     stopped_sweep(path, after=200)
     parts = sorted((tmp_path / 'a.parquet.parts').glob('*.parquet'))
     assert len(parts) >= 4
     times = {part: part.stat().st_mtime_ns for part in parts}
-    parts[-1].write_bytes(parts[-1].read_bytes()[:100])  # a part that a power cut tore
-    seen = []
+    parts[-1].write_bytes(parts[-1].read_bytes()[:100])  # a part torn by a power failure
+    progress_calls = []
 
     def progress(done: int, total: int) -> None:
-        seen.append(done)
-        unharmed = parts[:-1]
-        assert {part: part.stat().st_mtime_ns for part in unharmed} == {
-            part: times[part] for part in unharmed
+        progress_calls.append(done)
+        complete = parts[:-1]
+        assert {part: part.stat().st_mtime_ns for part in complete} == {
+            part: times[part] for part in complete
         }
 
-    with pytest.raises(ConfigError, match='--resume goes on'):
-        sweep(QUESTION, path)
-    sweep(QUESTION, path, resume=True, progress=progress)
-    assert seen[0] == 50 * (len(parts) - 1)
+    with pytest.raises(ConfigError, match='--resume continues'):
+        sweep(STUDY, path)
+    sweep(STUDY, path, resume=True, progress=progress)
+    assert progress_calls[0] == 50 * (len(parts) - 1)
     assert_same(read(path), expected)
 
 
-def test_resuming_another_question_is_refused_and_says_what_differs(tmp_path):
+def test_resuming_another_study_is_refused_with_the_differences(tmp_path):
     path = tmp_path / 'a.parquet'
     stopped_sweep(path, after=100)
     other = Study(
-        setup=Setup(disc=FRISBEE, step=0.01), scatter=QUESTION.scatter, count=600, seed=4,
-        correlations=QUESTION.correlations,
+        setup=Setup(disc=FRISBEE, step=0.01), scatter=STUDY.scatter, count=600, seed=4,
+        correlations=STUDY.correlations,
     )  # fmt: skip
     with pytest.raises(ConfigError, match=r'step 0\.02, now 0\.01; seed 3, now 4$'):
         sweep(other, path, resume=True)
     with pytest.raises(ConfigError, match='batch 50, now 60'):
-        sweep(QUESTION, path, resume=True, batch=60)
+        sweep(STUDY, path, resume=True, batch=60)
 
 
 def test_two_sweeps_into_one_file_are_refused(tmp_path):
@@ -263,13 +265,13 @@ def test_two_sweeps_into_one_file_are_refused(tmp_path):
 
     def progress(done: int, total: int) -> None:
         with pytest.raises(ConfigError, match='another process'):
-            sweep(QUESTION, path, resume=True)
+            sweep(STUDY, path, resume=True)
 
-    sweep(QUESTION, path, progress=progress)
+    sweep(STUDY, path, progress=progress)
     assert path.exists()
 
 
-def test_a_killed_worker_costs_its_batches_and_nothing_else(expected, tmp_path):
+def test_a_killed_worker_loses_only_its_batches(expected, tmp_path):
     path = tmp_path / 'a.parquet'
     pool = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context('spawn'))
 
@@ -279,44 +281,44 @@ def test_a_killed_worker_costs_its_batches_and_nothing_else(expected, tmp_path):
                 os.kill(process.pid, signal.SIGKILL)
 
     with pytest.raises(InterruptedSweepError, match='a worker died'):
-        sweep(QUESTION, path, executor=pool, batch=50, ahead=4, progress=progress)
+        sweep(STUDY, path, executor=pool, batch=50, ahead=4, progress=progress)
     pool.shutdown()
     kept = len(list((tmp_path / 'a.parquet.parts').glob('*.parquet')))
     assert 3 <= kept < 12
-    seen = []
-    sweep(QUESTION, path, resume=True, progress=lambda done, _: seen.append(done))
-    assert seen[0] == 50 * kept
+    progress_calls = []
+    sweep(STUDY, path, resume=True, progress=lambda done, _: progress_calls.append(done))
+    assert progress_calls[0] == 50 * kept
     assert_same(read(path), expected)
 
 
 @contextlib.contextmanager
 def small_disk(folder: Path, size: int):
-    """Mount a disk of `size` bytes; only root may."""
+    """Mount a disk of `size` bytes; needs root."""
     folder.mkdir()
     command = ['mount', '-t', 'tmpfs', '-o', f'size={size}', 'tmpfs', str(folder)]
     if os.geteuid() != 0 or shutil.which('mount') is None:
-        pytest.skip('only root mounts a small disk')
+        pytest.skip('mounting a small disk needs root')
     if subprocess.run(command, capture_output=True, check=False).returncode:
-        pytest.skip('this container mounts nothing')
+        pytest.skip('this container does not allow mounting')
     try:
         yield
     finally:
         subprocess.run(['umount', str(folder)], check=True)
 
 
-def test_a_full_disk_is_one_line_and_the_finished_flights_stay(expected, tmp_path):
+def test_a_full_disk_is_reported_in_one_line_and_finished_flights_are_kept(expected, tmp_path):
     disk = tmp_path / 'disk'
     with small_disk(disk, 64 * 1024):
         path = disk / 'a.parquet'
         with pytest.raises(DiscSimError, match='No space left on device'):
-            sweep(QUESTION, path, batch=50)
+            sweep(STUDY, path, batch=50)
         kept = list((disk / 'a.parquet.parts').glob('*.parquet'))
         assert 1 <= len(kept) < 12
         assert {tables.rows_of(part) for part in kept} == {50}
-        seen = []
+        progress_calls = []
         subprocess.run(['mount', '-o', 'remount,size=4m', str(disk)], check=True)
-        sweep(QUESTION, path, resume=True, progress=lambda done, _: seen.append(done))
-        assert seen[0] == 50 * len(kept)
+        sweep(STUDY, path, resume=True, progress=lambda done, _: progress_calls.append(done))
+        assert progress_calls[0] == 50 * len(kept)
         assert_same(read(path), expected)
 
 
@@ -332,35 +334,35 @@ def test_a_disk_that_fills_up_at_the_end_keeps_the_parts(expected, tmp_path):
                         file.write(bytes(4096))
 
         with pytest.raises(DiscSimError, match='No space left on device'):
-            sweep(QUESTION, path, batch=50, progress=progress)
+            sweep(STUDY, path, batch=50, progress=progress)
         assert not path.exists()
         (disk / 'filler').unlink()
-        sweep(QUESTION, path, resume=True)
+        sweep(STUDY, path, resume=True)
         assert_same(read(path), expected)
 
 
-def test_a_killed_program_leaves_what_it_had_finished(expected, tmp_path):
+def test_a_killed_program_leaves_its_finished_flights(expected, tmp_path):
     path = tmp_path / 'a.parquet'
     script = f"""
 import os, signal, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
-from test_sweep import QUESTION, sweep
+from test_sweep import STUDY, sweep
 def progress(done, total):
     if done >= 150:
         os.kill(os.getpid(), signal.SIGKILL)
-sweep(QUESTION, {str(path)!r}, batch=50, progress=progress)
+sweep(STUDY, {str(path)!r}, batch=50, progress=progress)
 """
     ended = subprocess.run([sys.executable, '-c', script], check=False, timeout=120)
     assert ended.returncode == -signal.SIGKILL
-    begun = time.monotonic()
-    seen = []
-    sweep(QUESTION, path, resume=True, progress=lambda done, _: seen.append(done))
-    assert time.monotonic() - begun < 30.0
-    assert seen[0] == 150
+    started = time.monotonic()
+    progress_calls = []
+    sweep(STUDY, path, resume=True, progress=lambda done, _: progress_calls.append(done))
+    assert time.monotonic() - started < 30.0
+    assert progress_calls[0] == 150
     assert_same(read(path), expected)
 
 
-def test_a_csv_file_has_its_question_beside_it(tmp_path):
+def test_a_csv_file_has_its_study_in_a_file_beside_it(tmp_path):
     path = sweep(Study(setup=SETUP, vary={'pitch': [5.0, 10.0]}), tmp_path / 'b.csv')
     lines = path.read_text().splitlines()
     assert lines[0].startswith('index,pitch_deg,status,time_s,x_m')

@@ -1,4 +1,4 @@
-"""Samples: each depends on the seed and its number alone, and follows the law it was asked for."""
+"""Samples: each depends only on the seed and on its number, and follows its law."""
 
 import math
 import warnings
@@ -20,7 +20,7 @@ from disc_sim_ros.studies.study import Study
 SETUP = Setup(disc=disc_file.load_disc('frisbee'), step=0.01)
 
 
-def ask(**changes) -> Study:
+def study_of(**changes) -> Study:
     return Study(**({'setup': SETUP} | changes))
 
 
@@ -34,7 +34,7 @@ def test_a_sample_is_the_same_wherever_it_is_drawn(method):
     assert not np.any(whole == sampling.unit_samples(method, 5, 8, 0, 10_000, count=10_000))
 
 
-def test_the_sobol_points_are_those_of_scipy_before_they_are_scrambled():
+def test_sobol_points_before_scrambling_are_those_of_scipy():
     index = np.arange(1000)
     gray = index ^ (index >> 1)
     basis = sampling._sobol_basis(6, 10)
@@ -47,7 +47,7 @@ def test_the_sobol_points_are_those_of_scipy_before_they_are_scrambled():
     assert_array_equal(digits * 2.0**-30, expected)
 
 
-def test_scrambled_sobol_points_stay_a_net():
+def test_scrambled_sobol_points_are_still_a_net():
     """Each of 2^k equal slices of each axis holds the same number of 2^m points, k <= m."""
     points = sampling.unit_samples('sobol', 8, 3, 0, 1024, count=1024)
     slices = np.floor(points * 1024).astype(int)
@@ -58,41 +58,41 @@ def test_sobol_integrates_better_than_random_samples():
     """The mean of a smooth function: about 1/n against 1/sqrt(n), here 30 times better."""
     errors = {}
     for method in sampling.METHODS:
-        found = [
+        means = [
             sampling.unit_samples(method, 3, seed, 0, 4096, count=4096).prod(axis=1).mean()
             for seed in range(8)
         ]
-        errors[method] = math.sqrt(np.mean((np.array(found) - 0.125) ** 2))
+        errors[method] = math.sqrt(np.mean((np.array(means) - 0.125) ** 2))
     assert errors['sobol'] < errors['random'] / 10
 
 
-def test_scatter_has_the_law_it_was_given():
-    question = ask(
+def test_scattered_quantities_follow_their_laws():
+    study = study_of(
         scatter={'speed': Normal(1.5, 20.0), 'pitch': Uniform(5.0, 15.0), 'roll': Normal(2.0)},
         launch=Launch(roll=-4.0), count=20_000, seed=5,
     )  # fmt: skip
-    found = question.values(0, 20_000)
+    values = study.values(0, 20_000)
     # Kolmogorov-Smirnov: a p-value below 1e-3 in one of three would be chance once in 300 seeds.
-    assert stats.kstest(found['speed'], stats.norm(20.0, 1.5).cdf).pvalue > 1e-3
-    assert stats.kstest(found['pitch'], stats.uniform(5.0, 10.0).cdf).pvalue > 1e-3
-    assert stats.kstest(found['roll'], stats.norm(-4.0, 2.0).cdf).pvalue > 1e-3
+    assert stats.kstest(values['speed'], stats.norm(20.0, 1.5).cdf).pvalue > 1e-3
+    assert stats.kstest(values['pitch'], stats.uniform(5.0, 10.0).cdf).pvalue > 1e-3
+    assert stats.kstest(values['roll'], stats.norm(-4.0, 2.0).cdf).pvalue > 1e-3
 
 
-def test_correlations_are_those_that_were_asked():
-    question = ask(
+def test_correlations_are_as_given():
+    study = study_of(
         scatter={'speed': Normal(1.0, 20.0), 'spin': Normal(3.0, 40.0), 'yaw': Normal(2.0)},
         correlations={('speed', 'spin'): 0.8, ('spin', 'yaw'): -0.3},
         count=2**16, sampling='sobol',
     )  # fmt: skip
-    found = question.values(0, 2**16)
-    matrix = np.corrcoef([found['speed'], found['spin'], found['yaw']])
+    values = study.values(0, 2**16)
+    matrix = np.corrcoef([values['speed'], values['spin'], values['yaw']])
     # Quasi-random: the error of 65536 samples is far below the 0.004 of random ones.
     assert_allclose(matrix, [[1, 0.8, 0], [0.8, 1, -0.3], [0, -0.3, 1]], atol=2e-3)
 
 
-def test_a_normal_law_is_cut_off_where_the_quantity_ends():
-    question = ask(scatter={'height': Normal(1.0, 0.5)}, count=20_000)
-    height = question.values(0, 20_000)['height']
+def test_a_normal_law_is_truncated_at_the_bounds_of_the_quantity():
+    study = study_of(scatter={'height': Normal(1.0, 0.5)}, count=20_000)
+    height = study.values(0, 20_000)['height']
     assert height.min() >= 0.0
     expected = stats.truncnorm(-0.5, math.inf, 0.5, 1.0)
     assert stats.kstest(height, expected.cdf).pvalue > 1e-3
@@ -100,37 +100,37 @@ def test_a_normal_law_is_cut_off_where_the_quantity_ends():
     assert_allclose(share, expected.cdf(height), atol=1e-12)
 
 
-def test_a_grid_turns_its_last_name_fastest_and_holds_every_sample_at_each_point():
-    question = ask(
+def test_the_last_name_of_a_grid_changes_fastest_and_each_point_has_all_samples():
+    study = study_of(
         vary={'pitch': [5.0, 10.0], 'roll': [-1.0, 0.0, 1.0]},
         scatter={'speed': Normal(1.0), 'roll': Normal(0.5)}, count=4,
     )  # fmt: skip
-    assert (question.size, question.shape) == (24, (2, 3))
-    found = question.values(0, 24)
-    assert_array_equal(found['pitch'], np.repeat([5.0, 10.0], 12))
-    speed = found['speed'].reshape(6, 4)
+    assert (study.size, study.shape) == (24, (2, 3))
+    values = study.values(0, 24)
+    assert_array_equal(values['pitch'], np.repeat([5.0, 10.0], 12))
+    speed = values['speed'].reshape(6, 4)
     assert_array_equal(speed, np.tile(speed[0], (6, 1)))
-    away = found['roll'].reshape(6, 4) - np.tile([-1.0, 0.0, 1.0], 2)[:, None]
+    away = values['roll'].reshape(6, 4) - np.tile([-1.0, 0.0, 1.0], 2)[:, None]
     assert_allclose(away, np.tile(away[0], (6, 1)), atol=1e-12)  # rounding of sums of order 1
 
 
-def test_values_do_not_depend_on_where_a_batch_begins():
-    question = ask(
+def test_values_do_not_depend_on_the_batch():
+    study = study_of(
         vary={'pitch': [5.0, 10.0, 15.0]},
         scatter={'speed': Normal(1.0), 'spin': Normal(3.0), 'roll': Uniform(-5.0, 5.0)},
         correlations={('speed', 'spin'): 0.5}, count=700,
     )  # fmt: skip
-    whole = question.values(0, question.size)
+    whole = study.values(0, study.size)
     for start, stop in ((0, 100), (650, 750), (699, 2100), (1399, 1400)):
-        for name, values in question.values(start, stop).items():
+        for name, values in study.values(start, stop).items():
             assert_array_equal(values, whole[name][start:stop])
 
 
-def test_gusts_are_seeded_by_the_sample():
+def test_the_seed_of_the_gusts_follows_the_sample():
     windy = Setup(disc=SETUP.disc, step=0.01, wind=Wind(turbulence=5.0, seed=40))
-    question = ask(setup=windy, vary={'pitch': [5.0, 10.0]}, count=3)
-    assert_array_equal(question.gust_seeds(0, 6), [40, 41, 42, 40, 41, 42])
-    assert ask(setup=windy, vary={'pitch': [5.0]}, gusts='same').gust_seeds(0, 1) is None
+    study = study_of(setup=windy, vary={'pitch': [5.0, 10.0]}, count=3)
+    assert_array_equal(study.gust_seeds(0, 6), [40, 41, 42, 40, 41, 42])
+    assert study_of(setup=windy, vary={'pitch': [5.0]}, gusts='same').gust_seeds(0, 1) is None
 
 
 @pytest.mark.parametrize(
@@ -141,12 +141,12 @@ def test_gusts_are_seeded_by_the_sample():
         ({'vary': {'speed': [-1.0]}}, 'from 0 to 200 m/s'),
         ({'vary': {'pich': [1.0]}}, 'choose from speed, pitch'),
         ({'vary': {'pitch': [1.0]}, 'scatter': {'pitch': Normal(1.0, 5.0)}}, 'varied already'),
-        ({'vary': {'spin': [1.0]}, 'advance_ratio': 0.3}, 'give one'),
+        ({'vary': {'spin': [1.0]}, 'advance_ratio': 0.3}, 'one determines the other'),
         ({'scatter': {'speed': Normal(1.0, -3.0)}}, 'from 0 to 200 m/s'),
         ({'scatter': {'speed': Uniform(1.0, 300.0)}}, 'from 0 to 200 m/s'),
         ({'scatter': {'spin': Normal(200.0)}, 'count': 9}, 'RK4 needs at most'),
-        ({'count': 5}, 'nothing differs'),
-        ({'sampling': 'sobol'}, 'nothing scatters'),
+        ({'count': 5}, 'all samples would be the same'),
+        ({'sampling': 'sobol'}, 'no quantity scatters'),
         ({'vary': {'height': [-1.0]}}, 'from 0 to'),
         ({'scatter': {'speed': Normal(1.0)}, 'correlations': {('speed', 'spin'): 0.5}}, 'only'),
         ({'scatter': {n: Normal(1.0) for n in ('speed', 'spin', 'roll')},
@@ -156,7 +156,7 @@ def test_gusts_are_seeded_by_the_sample():
 )  # fmt: skip
 def test_contradictions_are_refused(changes, message):
     with pytest.raises(ConfigError, match=message):
-        ask(**changes)
+        study_of(**changes)
 
 
 @pytest.mark.parametrize('sd', [0.0, -1.0, math.nan, math.inf])

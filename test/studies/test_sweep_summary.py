@@ -28,7 +28,7 @@ SCATTER = Study(
 )  # fmt: skip
 
 
-def test_moments_in_pieces_are_those_of_the_whole():
+def test_moments_of_chunks_are_those_of_all_rows():
     rows = np.random.default_rng(1).normal([1e6, 2.0, -3.0], [1.0, 5.0, 1e-3], (5000, 3))
     moments = Moments(3)
     for piece in np.array_split(rows, 7):
@@ -42,26 +42,26 @@ def test_moments_in_pieces_are_those_of_the_whole():
 
 def test_percentiles_are_within_a_bin_of_the_exact_ones():
     values = np.random.default_rng(2).exponential(3.0, 100_000)
-    found = Percentiles(values.min(), values.max())
+    percentiles = Percentiles(values.min(), values.max())
     for piece in np.array_split(values, 9):
-        found.add(piece)
+        percentiles.add(piece)
     width = (values.max() - values.min()) / 2**16
     for percent in (0.1, 5.0, 50.0, 99.0):
         # One bin, and the gap between neighbours, which at 99 % is 3 / (100000 * 0.01) m.
-        assert abs(found.at(percent) - np.percentile(values, percent)) < 2 * width + 0.01
+        assert abs(percentiles.at(percent) - np.percentile(values, percent)) < 2 * width + 0.01
 
 
 def test_group_means_are_those_of_the_groups():
     rng = np.random.default_rng(3)
     group, rows = rng.integers(0, 5, 3000), rng.normal(1e4, 2.0, (3000, 2))
-    found = GroupMeans(6, 2)
+    means = GroupMeans(6, 2)
     for place in np.array_split(np.arange(3000), 4):
-        found.add(group[place], rows[place])
+        means.add(group[place], rows[place])
     for g in range(5):
-        assert_allclose(found.mean[g], rows[group == g].mean(axis=0), rtol=1e-12)
-        assert_allclose(found.variance[g], rows[group == g].var(axis=0, ddof=1), rtol=1e-8)
-    assert found.n[5] == 0
-    assert np.isnan(found.mean[5]).all()
+        assert_allclose(means.mean[g], rows[group == g].mean(axis=0), rtol=1e-12)
+        assert_allclose(means.variance[g], rows[group == g].var(axis=0, ddof=1), rtol=1e-8)
+    assert means.n[5] == 0
+    assert np.isnan(means.mean[5]).all()
 
 
 def test_first_order_indices_of_the_ishigami_function():
@@ -76,7 +76,7 @@ def test_first_order_indices_of_the_ishigami_function():
         assert between_share(groups)[0] == pytest.approx(exact, abs=0.01)
 
 
-def test_ellipses_of_a_normal_law_hold_what_they_say():
+def test_ellipses_of_a_normal_law_hold_their_share():
     rng = np.random.default_rng(5)
     covariance = np.array([[9.0, 4.0], [4.0, 4.0]])
     xy = rng.multivariate_normal([0.0, 0.0], covariance, 200_000)
@@ -88,60 +88,60 @@ def test_ellipses_of_a_normal_law_hold_what_they_say():
     assert math.tan(math.radians(2 * angle)) == pytest.approx(2 * 4.0 / (9.0 - 4.0))
 
 
-def test_a_summary_is_what_numpy_says_of_the_flights(tmp_path):
-    found = collect(SCATTER)
-    for flights in (found, sweep(SCATTER, tmp_path / 'a.parquet', batch=300)):
-        summary = summarise(flights, SCATTER)
+def test_a_summary_agrees_with_numpy(tmp_path):
+    flights = collect(SCATTER)
+    for source in (flights, sweep(SCATTER, tmp_path / 'a.parquet', batch=300)):
+        summary = summarise(source, SCATTER)
         assert summary.counts == {'flying': 0, 'landed': 1000, 'lost': 0}
         for name, spread in summary.spreads.items():
-            assert spread.mean == pytest.approx(found[name].mean(), rel=1e-9)
-            assert spread.sd == pytest.approx(found[name].std(ddof=1), rel=1e-9)
-            median = np.median(found[name])
-            span = found[name].max() - found[name].min()
+            assert spread.mean == pytest.approx(flights[name].mean(), rel=1e-9)
+            assert spread.sd == pytest.approx(flights[name].std(ddof=1), rel=1e-9)
+            median = np.median(flights[name])
+            span = flights[name].max() - flights[name].min()
             assert abs(spread.percentiles[50.0] - median) < 0.01 * span
-        x = np.column_stack([found[n] for n in ('speed_m_s', 'pitch_deg', 'roll_deg')])
-        slopes = np.linalg.lstsq(np.column_stack([np.ones(1000), x]), found['range_m'])[0][1:]
-        of_range = [s for s in summary.sensitivities if s.answer == 'range_m']
+        x = np.column_stack([flights[n] for n in ('speed_m_s', 'pitch_deg', 'roll_deg')])
+        slopes = np.linalg.lstsq(np.column_stack([np.ones(1000), x]), flights['range_m'])[0][1:]
+        of_range = [s for s in summary.sensitivities if s.result == 'range_m']
         assert [s.quantity for s in of_range] == ['speed', 'pitch', 'roll']
         assert_allclose([s.slope for s in of_range], slopes, rtol=1e-9)
 
 
 def test_sensitivities_in_vacuum_are_those_of_the_parabola():
     """Range V^2 sin(2 theta) / g: its slopes at 15 m/s and 30 degrees are 2.65 and 0.40 m."""
-    question = Study(
+    study = Study(
         setup=VACUUM, launch=Launch(pitch=30.0), count=4096, sampling='sobol',
         scatter={'speed': Normal(0.05), 'pitch': Normal(0.05)},
     )  # fmt: skip
-    found = [s for s in summarise(collect(question), question).sensitivities
-             if s.answer == 'range_m']  # fmt: skip
+    of_range = [s for s in summarise(collect(study), study).sensitivities
+             if s.result == 'range_m']  # fmt: skip
     speed, angle = 15.0, math.radians(60.0)
     per_speed = 2 * speed * math.sin(angle) / 9.81
     per_degree = 2 * speed**2 * math.cos(angle) / 9.81 * math.pi / 180
-    assert found[0].slope == pytest.approx(per_speed, rel=1e-3)  # curvature over the scatter
-    assert found[1].slope == pytest.approx(per_degree, rel=1e-3)
+    assert of_range[0].slope == pytest.approx(per_speed, rel=1e-3)  # curvature over the scatter
+    assert of_range[1].slope == pytest.approx(per_degree, rel=1e-3)
     share = per_speed**2 / (per_speed**2 + per_degree**2)
-    assert found[0].first_order == pytest.approx(share, abs=0.01)  # 64 bins
-    assert found[0].correlation == pytest.approx(math.sqrt(share), abs=1e-3)
+    assert of_range[0].first_order == pytest.approx(share, abs=0.01)  # 64 bins
+    assert of_range[0].correlation == pytest.approx(math.sqrt(share), abs=1e-3)
 
 
-def test_the_best_grid_point_is_the_greatest():
-    question = Study(
+def test_the_best_grid_point_has_the_greatest_mean():
+    study = Study(
         setup=SETUP, vary={'pitch': [5.0, 10.0, 15.0], 'roll': [-5.0, 0.0]},
         scatter={'speed': Normal(1.0)}, count=10,
     )  # fmt: skip
-    found = collect(question)
-    summary = summarise(found, question)
-    means = found['range_m'].reshape(6, 10).mean(axis=1)
+    flights = collect(study)
+    summary = summarise(flights, study)
+    means = flights['range_m'].reshape(6, 10).mean(axis=1)
     best = summary.best[0]
     assert best.mean == pytest.approx(means.max(), rel=1e-12)
     assert best.point == means.argmax()
-    pitch, roll = (found[n].reshape(6, 10)[best.point, 0] for n in ('pitch_deg', 'roll_deg'))
+    pitch, roll = (flights[n].reshape(6, 10)[best.point, 0] for n in ('pitch_deg', 'roll_deg'))
     assert best.values == {'pitch': pitch, 'roll': roll}
 
 
-def test_flights_that_do_not_land_are_counted_apart():
-    question = Study(setup=SETUP, vary={'pitch': [10.0, 80.0]}, duration=3.0)
-    summary = summarise(collect(question), question)
+def test_flights_that_do_not_land_are_counted_separately():
+    study = Study(setup=SETUP, vary={'pitch': [10.0, 80.0]}, duration=3.0)
+    summary = summarise(collect(study), study)
     assert summary.counts == {'flying': 1, 'landed': 1, 'lost': 0}
     assert summary.spreads['time_s'].greatest < 3.0
     none = Study(setup=SETUP, vary={'pitch': [10.0, 20.0]}, duration=0.1)
@@ -150,7 +150,7 @@ def test_flights_that_do_not_land_are_counted_apart():
 
 
 @pytest.mark.parametrize(
-    ('question', 'panels', 'words'),
+    ('study', 'panels', 'words'),
     [
         (SCATTER, 2, ['forward x, m', 'sd of the result']),
         (Study(setup=SETUP, vary={'pitch': [5.0, 10.0, 15.0]}), 3, ['', 'range, m']),
@@ -161,25 +161,25 @@ def test_flights_that_do_not_land_are_counted_apart():
     ],
     ids=['scatter', 'curve', 'map', 'more'],
 )  # fmt: skip
-def test_each_kind_of_question_has_its_plot(question, panels, words):
-    found = collect(question)
-    page = figure(found, summarise(found, question))
+def test_each_kind_of_study_has_its_plot(study, panels, words):
+    flights = collect(study)
+    page = figure(flights, summarise(flights, study))
     assert len(page.axes) == panels
     labels = [text for axis in page.axes for text in (axis.get_xlabel(), axis.get_ylabel())]
     assert all(any(word in label for label in labels) for word in words)
-    if question is SCATTER:
+    if study is SCATTER:
         assert page.axes[0].get_aspect() == 1.0
         lines = page.axes[0].get_legend_handles_labels()[1]
         assert [line.split()[0] for line in lines] == ['release', '50', '90', '95']
         dots = next(line for line in page.axes[0].lines if len(line.get_xdata()) == 1000)
-        assert_allclose(dots.get_xdata(), found['x_m'])
+        assert_allclose(dots.get_xdata(), flights['x_m'])
     assert plots.image(page, 'png').startswith(b'\x89PNG')
 
 
 def test_a_density_holds_every_landing():
-    question = Study(setup=SETUP, scatter={'pitch': Normal(2.0)}, count=6000)
-    found = collect(question)
-    page = figure(found, summarise(found, question))
+    study = Study(setup=SETUP, scatter={'pitch': Normal(2.0)}, count=6000)
+    flights = collect(study)
+    page = figure(flights, summarise(flights, study))
     mesh = page.axes[0].collections[0]
     x_edges = mesh.get_coordinates()[0, :, 0]
     cell = (x_edges[1] - x_edges[0]) ** 2
