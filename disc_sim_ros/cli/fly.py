@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 import json
+from pathlib import Path
 import sys
 import time
 

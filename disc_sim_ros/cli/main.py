@@ -5,12 +5,9 @@ n. If the reader of stdout closes it, the program ends with 141, as if SIGPIPE h
 """
 
 from collections.abc import Callable, Sequence
-import os
 import signal
-import sys
 from typing import TYPE_CHECKING
 
-from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.errors import ConfigError, DiscSimError
 
@@ -63,28 +60,3 @@ def run_program(
     except KeyboardInterrupt as interrupt:
         number = interrupt.args[0] if interrupt.args else signal.SIGINT
         return 128 + int(number)
-
-
-def run_node(
-    usage: str, start: Callable[[list[str]], int], arguments: Sequence[str] | None, prog: str
-) -> int:
-    """Run a ROS node and return its exit code.
-
-    Ctrl-C and SIGTERM end it with code 0, also while Python still imports it.
-
-    Args:
-        usage: The text of `--help`; '{prog}' stands for the name of the program.
-        start: Imports and runs the node; takes the words of the command line, `prog` first.
-        arguments: Words of the command line; None for those of this process.
-        prog: Name of the program.
-    """
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os._exit(0))
-    words = sys.argv[1:] if arguments is None else list(arguments)
-    if {'-h', '--help'} & set(words):
-        sys.stdout.write(usage.format(prog=prog))
-        return 0
-    if '--version' in words:
-        sys.stdout.write(f'{prog} {__version__}\n')
-        return 0
-    return start([prog, *words])

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 import sys
 
-from disc_sim_ros.cli.main import run_node
+from disc_sim_ros.cli.node_program import run_node
 
 USAGE = """\
 usage: {prog} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r __ns:=NAMESPACE]...]

@@ -20,6 +20,7 @@ from disc_sim_ros.files import reason, sync_folder, write_whole
 from disc_sim_ros.studies import tables
 from disc_sim_ros.studies.study import Study, study_differences, study_document
 
+DEFAULT_BATCH = 8192  # flights; half a second on one core, 1 MB
 _PART = re.compile(r'(\d{10})\.parquet')
 _MANIFEST = 'question.json'  # as since 0.1: an older folder must not pass for an empty one
 
@@ -182,6 +183,3 @@ class Parts:
             if match or path.suffix == '.part':
                 path.unlink()
         return complete
-
-
-DEFAULT_BATCH = 8192  # flights; half a second on one core, 1 MB

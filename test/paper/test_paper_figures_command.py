@@ -122,7 +122,7 @@ def test_light_only_and_svg_in_one_process(tmp_path, capsys):
         (['--formats', 'gif'], "--formats: 'gif' is not allowed; choose from png, svg"),
         (['--jobs', '0'], "--jobs: '0' is not allowed; give a whole number from 1 to 64"),
         (['--jobs', 'two'], '--jobs'),
-        (['--out', 'file'], "--out: 'file' is not allowed; it is not a folder"),
+        (['--out', 'file'], "--out: 'file' is not allowed; this is not a folder"),
         (['--out', 'file/below'], '--out: '),
         (['--out', '/proc/none'], '--out: '),
         (['--out', 'a\0b'], '--out: '),
@@ -149,7 +149,7 @@ def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
     # Root may write everywhere, so the refusal itself is played.
     monkeypatch.setattr(paper_figures.tempfile, 'TemporaryFile', refuse)
     with pytest.raises(ConfigError, match=r'cannot write there \(Permission denied\)'):
-        paper_figures.made(str(tmp_path))
+        paper_figures.writable_folder(str(tmp_path))
 
 
 def test_a_full_disk_is_one_line_and_code_1(tmp_path, monkeypatch, capsys):
