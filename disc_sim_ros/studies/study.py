@@ -210,7 +210,8 @@ class Study:
             allowed = 'all samples would be the same; give a scatter, or gusts that differ'
             raise ConfigError('count', self.count, allowed)
         if self.gusts_differ and self.setup.wind.seed + self.count > LARGEST_SEED:
-            raise ConfigError('seed', self.setup.wind.seed, f'seed + count is at most {LARGEST_SEED}')
+            allowed = f'seed + count is at most {LARGEST_SEED}'
+            raise ConfigError('seed', self.setup.wind.seed, allowed)
 
     @cached_property
     def fastest_spin(self) -> float:

@@ -113,6 +113,6 @@ def test_make_fly_throws_also_where_there_is_no_ros(tmp_path):
     assert make_fly() == 'demo<--disc><my disc><--speed><25><--bag><a b>'
     program('.venv/bin/python', 'exit 1')
     note, _, called = make_fly().partition('\n')
-    assert note.startswith('fly: no ROS 2')
+    assert note.startswith('fly: .venv has no ROS 2')
     assert called.startswith('fly<--plot><flights/fig5.png><--disc><my disc><--speed><25>')
     assert (tmp_path / 'flights').is_dir()
