@@ -2,13 +2,14 @@
 //
 // usage: peer ENCLAVE_FOLDER|none DOMAIN pub|sub TOPIC SECONDS
 //
-// It publishes, or listens, for some seconds and prints what came of it as one line, the last of:
-// refused (its own permissions forbid it), unmatched, matched, heard.
+// It publishes or subscribes for some seconds and prints the outcome as one word, the last of:
+// refused (its own permissions forbid it), unmatched, matched, received.
 
 #include <chrono>
 #include <cstring>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -21,12 +22,13 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
 using namespace eprosima::fastdds::dds;
 using eprosima::fastrtps::rtps::InstanceHandle_t;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
 
-// Eight bytes behind the head of CDR: enough to see that something arrives.
+// Eight bytes after the CDR header: enough to see that a sample arrives.
 class Bytes : public TopicDataType
 {
 public:
@@ -86,6 +88,10 @@ int main(int count, char ** words)
   }
   const bool publishes = std::string(words[3]) == "pub";
   DomainParticipantQos qos;
+  // No shared memory: other versions of Fast DDS on this machine use the same segments.
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(
+    std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   if (std::string(words[1]) != "none") {
     secure(qos, words[1]);
   }
@@ -128,7 +134,7 @@ int main(int count, char ** words)
       reader->get_subscription_matched_status(status);
       SampleInfo info;
       if (reader->take_next_sample(data, &info) == ReturnCode_t::RETCODE_OK) {
-        outcome = "heard";
+        outcome = "received";
       } else if (status.total_count > 0 && outcome[0] == 'u') {
         outcome = "matched";
       }
