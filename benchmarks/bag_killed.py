@@ -1,7 +1,7 @@
 """How much a killed recorder loses, with messages at 1 kHz and a flush every 0.5 s.
 
-Writers are killed (SIGKILL) at random moments; the loss is the time from the last message on the
-disk to the last one that the writer had taken. Then each bag is repaired.
+Writers are killed (SIGKILL) at random moments; the loss is the time between the last message on
+the disk and the last one that the writer had accepted. Then each bag is repaired.
 
 usage: benchmarks/bag_killed.py [FOLDER]   (a folder on the disk to measure with; default: here)
 """
@@ -28,12 +28,12 @@ LONGEST = 2.0  # s that a writer lives after its first flush
 
 
 def main() -> None:
-    """Print what was measured."""
+    """Print the results."""
     print_lines(lines(Path(sys.argv[1]) if len(sys.argv) > 1 else Path()))
 
 
 def lines(parent: Path = Path()) -> tuple[Line, ...]:
-    """Kill, measure and repair on the disk of a folder."""
+    """Kill writers, measure the loss and repair the bags, on the disk of a folder."""
     rng = random.Random(1)  # noqa: S311 - not for secrets
     losses, repairs = [], []
     with tempfile.TemporaryDirectory(dir=parent) as scratch:

@@ -1,8 +1,8 @@
 """What a message costs from the state of the disc to the bytes that are published.
 
-Three ways to the same bytes: a message built afresh and serialised, one message that is kept and
-serialised again, and `nodes.wire.Wire`; `ratio` is fresh to Wire. The second table has what comes
-before in all three: the conversion of the state. CPU time in the best of a few rounds.
+Three ways to the same bytes: a new message each time, serialised; one message that is kept and
+serialised again; and `CdrTemplate`. `ratio` is new to CdrTemplate. The second table has the
+conversion of the state, which comes before all three. CPU time in the best of a few rounds.
 
 usage: benchmarks/messages.py
 """
@@ -27,7 +27,7 @@ ROUNDS = 9
 ROUND_S = 0.05  # CPU seconds a round
 STAMP = (1_700_000_000, 123_456_789)
 STATE = Launch().state()
-FRESH: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
+MESSAGES: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
     'Odometry': (lambda: Odometry(child_frame_id='disc'), messages.ODOMETRY_FIELDS),
     'PoseStamped': (PoseStamped, messages.POSE_FIELDS),
     'TransformStamped': (
@@ -46,45 +46,45 @@ FRESH: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
 def main() -> None:
     """Measure all types and print two tables."""
     print(f'Python {platform.python_version()}; us per message')
-    print(f'{"type":18} {"fresh":>8} {"kept":>8} {"Wire":>8} {"ratio":>8}')
-    for name, (make, fields) in FRESH.items():
-        fresh, kept, wire = (microseconds(way) for way in ways(make, fields))
-        print(f'{name:18} {fresh:8.2f} {kept:8.2f} {wire:8.3f} {fresh / wire:8.0f}')
+    print(f'{"type":18} {"new":>8} {"kept":>8} {"template":>8} {"ratio":>8}')
+    for name, (make, fields) in MESSAGES.items():
+        new, kept, template = (microseconds(way) for way in ways(make, fields))
+        print(f'{name:18} {new:8.2f} {kept:8.2f} {template:8.3f} {new / template:8.0f}')
 
     print(f'\n{"from the state":32} {"us":>8}')
-    for name, way in {**conversions_alone(), 'odom + pose, to bytes': pair()}.items():
+    for name, way in {**conversions(), 'odom + pose, to bytes': pair()}.items():
         print(f'{name:32} {microseconds(way):8.2f}')
 
 
 def ways(make: Callable[[], Any], fields: tuple[str, ...]) -> list[Callable[[], bytes]]:
-    """Return the three ways to the bytes of one type: fresh, kept and `Wire`."""
+    """Return the three ways to the bytes of one type: new, kept and `CdrTemplate`."""
     values = tuple(0.1 * i for i in range(len(fields)))
     stamped = hasattr(make(), 'header')
     setter = writer(fields, stamped=stamped)
     message = named(make(), stamped=stamped)
     pack = CdrTemplate(message, fields, ('header.stamp',) if stamped else ()).pack
 
-    def fresh() -> bytes:
-        new = named(make(), stamped=stamped)
-        setter(new, values)
-        return serialize_message(new)
+    def new() -> bytes:
+        new_message = named(make(), stamped=stamped)
+        setter(new_message, values)
+        return serialize_message(new_message)
 
     def kept() -> bytes:
         setter(message, values)
         return serialize_message(message)
 
-    return [fresh, kept, lambda: pack(*STAMP, *values)]
+    return [new, kept, lambda: pack(*STAMP, *values)]
 
 
 def named(message: Any, *, stamped: bool) -> Any:
-    """Return the message in `map`."""
+    """Return a message after setting its frame to `map`."""
     if stamped:
         message.header.frame_id = 'map'
     return message
 
 
 def writer(fields: tuple[str, ...], *, stamped: bool) -> Callable[[Any, tuple[float, ...]], None]:
-    """Return a function with one attribute assignment a field, as one would write it by hand."""
+    """Return a function that assigns each field of a message, as hand-written code would."""
     lines = [f'    message.{subscripted(path)} = values[{i}]' for i, path in enumerate(fields)]
     if stamped:
         lines += [f'    message.header.stamp.sec = {STAMP[0]}']
@@ -99,7 +99,7 @@ def subscripted(path: str) -> str:
     return ''.join(f'[{n}]' if n.isdigit() else f'.{n}' for n in path.split('.')).lstrip('.')
 
 
-def conversions_alone() -> dict[str, Callable[[], Any]]:
+def conversions() -> dict[str, Callable[[], Any]]:
     """Return the conversions that run at the rate of publication."""
     still, none = Velocity(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     return {
@@ -115,7 +115,7 @@ def conversions_alone() -> dict[str, Callable[[], Any]]:
 def pair() -> Callable[[], Any]:
     """Return the hot path: one state to the bytes of an Odometry and of a PoseStamped."""
     odom, pose = (
-        CdrTemplate(named(FRESH[name][0](), stamped=True), FRESH[name][1]).pack
+        CdrTemplate(named(MESSAGES[name][0](), stamped=True), MESSAGES[name][1]).pack
         for name in ('Odometry', 'PoseStamped')
     )
 

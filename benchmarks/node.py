@@ -1,8 +1,9 @@
-"""What sim_node costs, how late it is and how fast it starts, beside the naive way.
+"""CPU, lateness and start-up time of sim_node, beside a naive node.
 
 Every figure is measured in this run with real processes: the node, one that subscribes to `odom`
-and `pose`, one that sends commands. CPU is that of the node's process, per cent of one core.
-The naive way is the same physics in an rclpy timer, fresh messages, an executor's subscription.
+and `pose`, one that sends commands. CPU is that of the node's process, per cent of one core. The
+naive node runs the same physics in an rclpy timer, builds new messages, and takes commands in
+callbacks of the executor.
 
 usage: benchmarks/node.py [seconds of each measurement]
 """
@@ -39,16 +40,16 @@ DEADLINE = 60.0  # s, for a process to be ready
 
 
 def main() -> None:
-    """Print what was measured."""
+    """Print the results."""
     print_lines(lines(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0, topics_too=True))
 
 
 def lines(seconds: float = 10.0, *, topics_too: bool = False) -> tuple[Line, ...]:
-    """Measure in a ROS domain of its own, print a table and return what stands out.
+    """Measure in a ROS domain of its own, print a table and return the main results.
 
     Args:
-        seconds: How long to measure each.
-        topics_too: Also print what each optional topic costs.
+        seconds: Duration of each measurement.
+        topics_too: Also print the cost of each optional topic.
     """
     with processes.own_domain():
         return _lines(seconds, topics_too=topics_too)
@@ -60,16 +61,16 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
     bare = bare_thread(1e-3, seconds)
     print(f'{"bare sleeping thread at 1 kHz":54s} {bare[0]:7.1f} {"":8s} {"":7s} '
           f'{bare[1] * 1e6:9.0f} {bare[2] * 1e6:9.0f}')  # fmt: skip
-    plain = measured('sim_node 1 kHz, nobody listens', 1000, 1000, [], 0, seconds)
+    plain = measured('sim_node 1 kHz, no subscribers', 1000, 1000, [], 0, seconds)
     both = ['odom', 'pose']
     pairs = measured('sim_node 1 kHz, odom + pose 1 kHz', 1000, 1000, both, 0, seconds)
     line = 'sim_node 1 kHz, odom + pose + commands 1 kHz'
     full = measured(line, 1000, 1000, both, 1000, seconds)
     naive = measured('naive node, the same', 1000, 1000, both, 1000, seconds, naive=True)
     fast = measured('sim_node 10 kHz, odom + pose 10 kHz', 10000, 10000, both, 0, seconds)
-    print(f'\nodom + pose cost {pairs[0] - plain[0]:.1f} % over nobody listening')
+    print(f'\nodom + pose cost {pairs[0] - plain[0]:.1f} % more than no subscribers')
     if topics_too:
-        print('cost of an optional topic at 1 kHz, beyond nobody listening, CPU %:')
+        print('cost of an optional topic at 1 kHz, beyond no subscribers, CPU %:')
         for topic in [name for name in TYPES if name not in both]:
             cost = measured(topic, 1000, 1000, [topic], 0, seconds / 2, show=False)[0] - plain[0]
             print(f'  {topic:14s} {cost:5.1f}')
@@ -80,7 +81,7 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
     late = full[3] / bare[2]
     return (
         Line(
-            what='`sim_node` at 1 kHz, nobody listens',
+            what='`sim_node` at 1 kHz, no subscribers',
             ours=f'{plain[0]:.1f} % of a core',
             beside=f'a bare sleeping thread {bare[0]:.1f} %',
             ratio=plain[0] / bare[0],
@@ -88,7 +89,7 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
         Line(
             what='`odom`, `pose` and commands at 1 kHz',
             ours=f'{full[0]:.1f} % of a core',
-            beside=f'rclpy timer, fresh messages {naive[0]:.1f} %',
+            beside=f'rclpy timer, new messages {naive[0]:.1f} %',
             ratio=naive[0] / full[0],
             bound=f'at most {MOST_CPU:g} % of a core',
             kept=full[0] <= MOST_CPU,
@@ -132,7 +133,7 @@ def measured(
     label: str,
     physics: int,
     publish: int,
-    listened: list[str],
+    subscribed: list[str],
     command_rate: int,
     seconds: float,
     *,
@@ -140,11 +141,11 @@ def measured(
     show: bool = True,
 ) -> tuple[float, float, float, float]:
     """Return CPU per cent, messages a second, real-time factor and lateness p99 [s]."""
-    arguments = (physics, publish, listened, command_rate, seconds)
+    arguments = (physics, publish, subscribed, command_rate, seconds)
     try:
         used, rate, factor, p50, p99 = tried(*arguments, naive=naive)
-    except TimeoutError as error:  # which tells nothing of what they cost
-        print(f'once more, the processes did not find each other: {error}')
+    except TimeoutError as error:  # no result about their cost
+        print(f'repeated, the processes did not discover each other: {error}')
         used, rate, factor, p50, p99 = tried(*arguments, naive=naive)
     if show:
         print(f'{label:54s} {used:7.1f} {rate:8.0f} {factor:7.4f} '
@@ -155,7 +156,7 @@ def measured(
 def tried(
     physics: int,
     publish: int,
-    listened: list[str],
+    subscribed: list[str],
     command_rate: int,
     seconds: float,
     *,
@@ -164,30 +165,30 @@ def tried(
     """Return CPU per cent, messages a second, real-time factor and lateness p50, p99 [s].
 
     Raises:
-        TimeoutError: A listener hears nothing.
+        TimeoutError: The subscriber gets no message.
     """
     with ExitStack() as stack:
         node = stack.enter_context(simulator(physics, publish, naive=naive))
-        listener = None
-        if listened:
-            listener = stack.enter_context(role('listen', *listened))
+        subscriber = None
+        if subscribed:
+            subscriber = stack.enter_context(role('subscribe', *subscribed))
         if command_rate:
             stack.enter_context(role('command', str(command_rate)))
         watch = stack.enter_context(Watch.running())
         if not naive:
             watch.wait()
-        if listener is not None:
-            wait_for_word(listener)
-        time.sleep(1.0)  # commands, too, have found their way
+        if subscriber is not None:
+            wait_for_line(subscriber)
+        time.sleep(1.0)  # until commands are matched, too
         cpu, start = cpu_time(node.pid), time.monotonic()
         watch.spin(seconds)
         elapsed = time.monotonic() - start
         used = (cpu_time(node.pid) - cpu) / elapsed * 100
         rate = 0.0
-        if listener is not None:
-            listener.send_signal(signal.SIGINT)
-            rate = float(listener.communicate()[0].split()[-1])
-    return used, rate, *watch.seen()
+        if subscriber is not None:
+            subscriber.send_signal(signal.SIGINT)
+            rate = float(subscriber.communicate()[0].split()[-1])
+    return used, rate, *watch.medians()
 
 
 @contextmanager
@@ -210,7 +211,7 @@ def started(
         f'physics_rate:={float(physics)}', f'publish_rate:={float(publish)}',
         f'launch.height:={HIGH}', 'ground:=false', 'command_timeout:=0.5', *more,
     )  # fmt: skip
-    command = [sys.executable, '-m', 'disc_sim_ros.ros.sim.node', '--ros-args']
+    command = [sys.executable, '-m', 'disc_sim_ros.ros.sim', '--ros-args']
     for parameter in parameters:
         command += ['-p', parameter]
     with ended(subprocess.Popen(command, env={**os.environ, **environment})) as process:
@@ -228,7 +229,7 @@ def role(*words: str) -> Iterator[subprocess.Popen]:
 
 @contextmanager
 def ended(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
-    """End a process behind the block."""
+    """End a process after the block."""
     try:
         yield process
     finally:
@@ -241,11 +242,11 @@ def ended(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
             process.wait()
 
 
-def wait_for_word(process: subprocess.Popen) -> None:
+def wait_for_line(process: subprocess.Popen) -> None:
     """Wait until a process has printed a line.
 
     Raises:
-        TimeoutError: It does not.
+        TimeoutError: It prints none in time.
     """
     if not select.select([process.stdout], [], [], DEADLINE)[0] or not process.stdout.readline():
         raise TimeoutError(f'{process.args}: no message within {DEADLINE:g} s')
@@ -272,12 +273,12 @@ def bare_thread(period: float, seconds: float) -> tuple[float, float, float]:
 
 
 class Watch(Node):
-    """Reads what the simulation says of itself."""
+    """Subscribes to the diagnostics of the simulator."""
 
     @classmethod
     @contextmanager
     def running(cls) -> Iterator['Watch']:
-        """Watch while the block runs."""
+        """Yield a node that exists while the block runs."""
         rclpy.init()
         try:
             yield cls('watch')
@@ -293,19 +294,19 @@ class Watch(Node):
         self._values.append({pair.key: pair.value for pair in message.status[0].values})
 
     def spin(self, seconds: float) -> None:
-        """Listen for a while."""
+        """Take messages for a while [s]."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             rclpy.spin_once(self, timeout_sec=0.1)
 
     def wait(self) -> None:
-        """Listen until the simulation says something of itself; that does not count."""
+        """Wait for the first diagnostics, which do not count."""
         until = time.monotonic() + DEADLINE
         while not self._values and time.monotonic() < until:
             rclpy.spin_once(self, timeout_sec=0.1)
 
-    def seen(self) -> tuple[float, float, float]:
-        """Return medians of real-time factor, lateness p50 and p99; zeros of a naive node."""
+    def medians(self) -> tuple[float, float, float]:
+        """Return medians of real-time factor, lateness p50 and p99 [s]; zeros of a naive node."""
         rows = self._values[1:] or self._values
         if not rows:
             return 0.0, 0.0, 0.0
@@ -316,34 +317,34 @@ class Watch(Node):
 
 
 def command_to_effect() -> int:
-    """Return how many messages after the newest one a command's effect is published."""
+    """Return how many messages after the command its effect is published."""
     with started(1000, 1000, 'launch.spin:=0.0'), Watch.running() as node:
-        seen: list[Odometry] = []
-        node.create_subscription(Odometry, 'odom', seen.append, DEEP)
-        send = node.create_publisher(WrenchStamped, 'cmd_moment', 10)
-        while len(seen) < 500 or not send.get_subscription_count():
+        odom: list[Odometry] = []
+        node.create_subscription(Odometry, 'odom', odom.append, DEEP)
+        publisher = node.create_publisher(WrenchStamped, 'cmd_moment', 10)
+        while len(odom) < 500 or not publisher.get_subscription_count():
             rclpy.spin_once(node, timeout_sec=0.1)
         torque = WrenchStamped()
         torque.header.frame_id = 'disc'
         torque.wrench.torque.z = 0.001
-        before = len(seen)
-        send.publish(torque)
-        while seen[-1].twist.twist.angular.z == seen[before - 1].twist.twist.angular.z:
+        before = len(odom)
+        publisher.publish(torque)
+        while odom[-1].twist.twist.angular.z == odom[before - 1].twist.twist.angular.z:
             rclpy.spin_once(node, timeout_sec=0.1)
-        still = seen[before - 1].twist.twist.angular.z
-        return next(i for i, m in enumerate(seen[before:]) if m.twist.twist.angular.z != still) + 1
+        spin = odom[before - 1].twist.twist.angular.z
+        return next(i for i, m in enumerate(odom[before:]) if m.twist.twist.angular.z != spin) + 1
 
 
 def start_time(**environment: str) -> float:
     """Return the time from the start of the process to its first message [s]."""
     rclpy.init()
     try:
-        node = rclpy.create_node('listener')
-        seen: list[Odometry] = []
-        node.create_subscription(Odometry, 'odom', seen.append, DEEP)
+        node = rclpy.create_node('subscriber')
+        odom: list[Odometry] = []
+        node.create_subscription(Odometry, 'odom', odom.append, DEEP)
         start = time.monotonic()
         with started(1000, 1000, **environment):
-            while not seen:
+            while not odom:
                 rclpy.spin_once(node, timeout_sec=0.1)
             return time.monotonic() - start
     finally:

@@ -1,6 +1,6 @@
-"""The other processes of benchmarks/node.py: a listener, a commander and the naive node.
+"""The other processes of benchmarks/node.py: a subscriber, a commander and the naive node.
 
-usage: benchmarks/node_roles.py listen TOPIC ... | command RATE | naive RATE
+usage: benchmarks/node_roles.py subscribe TOPIC ... | command RATE | naive RATE
 """
 
 import sys
@@ -21,6 +21,7 @@ from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.ros import messages
+from disc_sim_ros.ros.internals import PolledSubscription
 
 DEEP = QoSProfile(depth=1000)
 TYPES = {
@@ -31,21 +32,20 @@ TYPES = {
 HIGH = 1000.0  # m: a disc thrown from here flies for minutes
 
 
-def listen(*names: str) -> None:
-    """Say when messages of the first of these topics come, and how many a second."""
+def subscribe(*names: str) -> None:
+    """Print a line when messages of the first topic arrive, and at the end how many a second."""
     rclpy.init()
-    node = rclpy.create_node('listener')
-    subscriptions = [node.create_subscription(TYPES[name], name, print, DEEP) for name in names]
-    readers = [(s.handle, TYPES[name]) for s, name in zip(subscriptions, names, strict=True)]
-    counts = [0] * len(readers)
+    node = rclpy.create_node('subscriber')
+    subscriptions = [PolledSubscription(node, TYPES[name], name, DEEP, raw=True) for name in names]
+    counts = [0] * len(subscriptions)
     first = None
     try:
         while True:
-            for k, (reader, kind) in enumerate(readers):
-                while reader.take_message(kind, True) is not None:  # noqa: FBT003 - raw
+            for k, subscription in enumerate(subscriptions):
+                while subscription.take() is not None:
                     counts[k] += 1
             if first is None and counts[0]:
-                print('hears', flush=True)
+                print('first message', flush=True)
                 first, counts[0] = time.monotonic(), 0
             time.sleep(1e-3)
     except KeyboardInterrupt:
@@ -70,7 +70,7 @@ def command(rate: str) -> None:
 
 
 def naive(rate: str) -> None:
-    """Be the node that one writes first."""
+    """Run the node that a first attempt would be."""
     rclpy.init()
     node = rclpy.create_node('naive')
     setup = Setup(disc=disc_file.load_disc('frisbee'), step=1.0 / float(rate))
@@ -107,4 +107,4 @@ def naive(rate: str) -> None:
 
 
 if __name__ == '__main__':
-    {'listen': listen, 'command': command, 'naive': naive}[sys.argv[1]](*sys.argv[2:])
+    {'subscribe': subscribe, 'command': command, 'naive': naive}[sys.argv[1]](*sys.argv[2:])

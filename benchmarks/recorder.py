@@ -1,4 +1,4 @@
-"""Record Odometry at 10 kHz: what is lost, what it costs, beside a plain callback and mcap alone.
+"""Record Odometry at 10 kHz: losses and cost, beside a plain callback and `mcap` alone.
 
 .venv/bin/python benchmarks/recorder.py [seconds, 60]
 """
@@ -24,11 +24,11 @@ from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.ros import messages as conversions
 from disc_sim_ros.ros import processes
 from disc_sim_ros.ros.cdr_template import CdrTemplate
+from disc_sim_ros.ros.messages import ODOMETRY_FIELDS
 from disc_sim_ros.ros.qos import STATE_QOS
-from disc_sim_ros.ros.recorder.writer_thread import BagThread
+from disc_sim_ros.ros.recorder.writer_thread import BagTopic, WriterThread
 from lines import Line, number, print_lines
 
 RATE = 10_000  # Hz
@@ -48,7 +48,7 @@ def odometry() -> Odometry:
 
 
 def place_of_number() -> int:
-    """Return where position.x, which carries the number of a message, is in its bytes."""
+    """Return the offset of position.x, which carries the number of a message, in its bytes."""
     message = odometry()
     message.pose.pose.position.x = 12345.6789
     return serialize_message(message).index(NUMBER.pack(12345.6789))
@@ -59,45 +59,45 @@ def publish(seconds: float) -> None:
     rclpy.init()
     node = Node('publisher')
     publisher = node.create_publisher(Odometry, 'odom', STATE_QOS)
-    pack = CdrTemplate(odometry(), conversions.ODOMETRY_FIELDS).pack
-    rest = (0.0,) * (len(conversions.ODOMETRY_FIELDS) - 1)
+    pack = CdrTemplate(odometry(), ODOMETRY_FIELDS).pack
+    rest = (0.0,) * (len(ODOMETRY_FIELDS) - 1)
     while not publisher.get_subscription_count():
         time.sleep(0.05)
     time.sleep(1.0)
-    begun, n = time.monotonic(), 0
+    start, n = time.monotonic(), 0
     while n < seconds * RATE:
-        due = min(round((time.monotonic() - begun) * RATE), round(seconds * RATE))
+        due = min(round((time.monotonic() - start) * RATE), round(seconds * RATE))
         for i in range(n, due):
             publisher.publish(pack(0, 0, float(i), *rest))
         n = max(n, due)
         time.sleep(BURST)
-    print(f'{n / (time.monotonic() - begun):.0f}', flush=True)
-    time.sleep(2.0)  # for the last to be acknowledged
+    print(f'{n / (time.monotonic() - start):.0f}', flush=True)
+    time.sleep(2.0)  # until the last message is acknowledged
     node.destroy_node()
     rclpy.try_shutdown()
 
 
 def record_plainly(file: str) -> None:
-    """Record in an ordinary callback: the body of the process beside which ours stands."""
-    ended: list[int] = []
+    """Record in an ordinary callback: the body of the process that is compared with ours."""
+    signals: list[int] = []
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    signal.signal(signal.SIGINT, lambda number, _: ended.append(number))
+    signal.signal(signal.SIGINT, lambda number, _: signals.append(number))
     node = Node('plain_recorder')
     with Path(file).open('wb') as stream:
-        writer, channel = begun(stream)
+        writer, channel = started_writer(stream)
 
         def write(data: bytes) -> None:
             now = time.time_ns()
             writer.add_message(channel, now, data, now)
 
         node.create_subscription(Odometry, 'odom', write, 10, raw=True)
-        while not ended:
+        while not signals:
             rclpy.spin_once(node, timeout_sec=0.1)
         writer.finish()
 
 
-def begun(stream: object) -> tuple[Writer, int]:
-    """Return a writer of the mcap package, and the channel of the odometry."""
+def started_writer(stream: object) -> tuple[Writer, int]:
+    """Return a writer of the `mcap` package, and its channel for Odometry."""
     writer = Writer(stream)
     writer.start('ros2')
     schema = writer.register_schema(TYPE, 'ros2msg', (schemas.definition(TYPE) or '').encode())
@@ -117,17 +117,17 @@ def measured(recorder: list[str], seconds: float) -> tuple[float, list[float], f
     sender = subprocess.Popen(
         [sys.executable, __file__, 'publish', str(seconds)], stdout=subprocess.PIPE, text=True
     )
-    time.sleep(4.0)  # until they have found each other
+    time.sleep(4.0)  # until they have discovered each other
     cpu, memory = usage(process.pid)
-    start, found = time.monotonic(), [memory]
+    start, memories = time.monotonic(), [memory]
     for _ in range(3):
         time.sleep((seconds - 2.0) / 3)
-        found.append(usage(process.pid)[1])
+        memories.append(usage(process.pid)[1])
     share = (usage(process.pid)[0] - cpu) / (time.monotonic() - start)
     rate = float(sender.communicate()[0])
     process.send_signal(signal.SIGINT)
     process.wait()
-    return share, found, rate
+    return share, memories, rate
 
 
 def numbers(messages: Callable[[], object]) -> list[int]:
@@ -137,11 +137,11 @@ def numbers(messages: Callable[[], object]) -> list[int]:
 
 
 def alone(messages: int, file: Path) -> float:
-    """Return how many messages mcap.Writer writes in a second of CPU time."""
+    """Return how many messages `mcap.Writer` alone writes in a second of CPU time."""
     data = serialize_message(odometry())
     start = time.process_time()
     with file.open('wb') as stream:
-        writer, channel = begun(stream)
+        writer, channel = started_writer(stream)
         for n in range(messages):
             writer.add_message(channel, n, data, n)
         writer.finish()
@@ -151,11 +151,11 @@ def alone(messages: int, file: Path) -> float:
 def written(messages: int, folder: Path) -> float:
     """Return how many messages the recorder's thread writes in a second of CPU time."""
     data = serialize_message(odometry())
-    thread = BagThread(BagWriter(folder), 0.5)
-    thread.call(lambda bag: bag.add(Topic(name='/odom', type=TYPE)))
+    thread, topic = WriterThread(BagWriter(folder), 0.5), BagTopic()
+    thread.add_topic(topic, Topic(name='/odom', type=TYPE))
     start = time.process_time()
     for n in range(messages):
-        thread.put(1, data, n, n)
+        thread.put(topic, data, n, n)
     thread.start()
     thread.end()
     thread.join()
@@ -163,7 +163,7 @@ def written(messages: int, folder: Path) -> float:
 
 
 def main() -> None:
-    """Print what was measured, or be one of its processes."""
+    """Print the results, or run one of the processes."""
     if sys.argv[1:2] == ['publish']:
         publish(float(sys.argv[2]))
     elif sys.argv[1:2] == ['plain']:
@@ -173,16 +173,16 @@ def main() -> None:
 
 
 def lines(seconds: float = 60.0) -> tuple[Line, ...]:
-    """Record for some time, and write as much as can be written."""
+    """Record for some time [s], and write as fast as possible; return the results."""
     with tempfile.TemporaryDirectory() as scratch, processes.own_domain():
         folder = Path(scratch)
         total = round(seconds * RATE)
-        ours = [sys.executable, '-m', 'disc_sim_ros.ros.recorder.node', '--ros-args']
+        ours = [sys.executable, '-m', 'disc_sim_ros.ros.recorder', '--ros-args']
         ours += ['-p', f'bag:={folder / "bag"}', '-p', 'topics:=/odom']
         share, memory, rate = measured(ours, seconds)
         bag = open_bag(folder / 'bag')
-        found = numbers(lambda: bag.raw(['/odom']))
-        whole = found == list(range(total))
+        recorded = numbers(lambda: bag.raw(['/odom']))
+        whole = recorded == list(range(total))
         print(f'published {total} messages at {rate:.0f} Hz')
         plain = [sys.executable, __file__, 'plain', str(folder / 'plain.mcap')]
         plain_share, _, _ = measured(plain, min(seconds, 10.0))
@@ -190,14 +190,14 @@ def lines(seconds: float = 60.0) -> tuple[Line, ...]:
         kept = len(numbers(lambda: open_bag(folder / 'plain.mcap').raw(['/odom'])))
         writer = alone(100_000, folder / 'alone.mcap')
         own = written(100_000, folder / 'written')
-    told = 'all, in order' if whole else 'NOT ALL, OR NOT IN ORDER'
-    all_of_it = rate / share
+    result = 'all, in order' if whole else 'NOT ALL, OR NOT IN ORDER'
+    whole_path = rate / share
     return (
         Line(
             what=f'`recorder_node`, {RATE:,} Odometry a second for {seconds:g} s',
-            ours=f'{len(found):,} of {total:,}, {told}',
+            ours=f'{len(recorded):,} of {total:,}, {result}',
             beside=f'a plain callback {kept / sent:.0%}',
-            ratio=len(found) / total / (kept / sent),
+            ratio=len(recorded) / total / (kept / sent),
             bound='nothing lost',
             kept=whole,
             short=True,
@@ -218,9 +218,9 @@ def lines(seconds: float = 60.0) -> tuple[Line, ...]:
         ),
         Line(
             what='all of it, with ROS and network',
-            ours=f'{number(all_of_it)} per CPU-second',
+            ours=f'{number(whole_path)} per CPU-second',
             beside=f'`mcap.Writer` alone, no network {number(writer)}',
-            ratio=all_of_it / writer,
+            ratio=whole_path / writer,
         ),
     )
 

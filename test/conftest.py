@@ -11,8 +11,8 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first impo
 
 IN_REAL_TIME, MAKES_WAY = 0, 10  # niceness
 FIRST = {  # half of those with nodes
-    'test_sim_node_control', 'test_sim_node_input', 'test_sim_node_process', 'test_recorder',
-    'test_parameters', 'test_parameters_of_a_node',
+    'sim/test_node_control', 'sim/test_node_input', 'sim/test_node_process', 'recorder/test_node',
+    'ros/test_parameters', 'ros/test_parameters_of_a_node',
 }  # fmt: skip
 
 
@@ -25,7 +25,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     for item in items:
         if is_ros(item):
-            half = 1 if item.path.stem in FIRST else 2
+            half = 1 if f'{item.path.parent.name}/{item.path.stem}' in FIRST else 2
             item.add_marker(pytest.mark.xdist_group(f'ros {half}'))
     items.sort(key=lambda item: (not is_ros(item), not item.get_closest_marker('xdist_group')))
 

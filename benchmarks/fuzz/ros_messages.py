@@ -16,7 +16,7 @@ from disc_sim_ros.physics.flight import MODELS, Setup
 from disc_sim_ros.physics.kernels.equations import Control, State
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.ros import messages
-from disc_sim_ros.ros.sim.commands import MOST_WAITING, Commands, Topic, pop_due
+from disc_sim_ros.ros.sim.commands import MOST_WAITING, Commands, CommandTopic, pop_due
 from disc_sim_ros.topics import Frames
 
 NAME = 'ros_messages'
@@ -61,9 +61,11 @@ def one(data: bytes) -> None:
             raise
         return
     commands = Commands(None, _FRAMES)
-    topic: Topic = (commands.moment, commands.coefficients, commands.wind, commands.throw)[number]
+    topic: CommandTopic = (commands.moment, commands.coefficients, commands.wind, commands.throw)[
+        number
+    ]
     try:
-        commands._take(topic, message, _NOW)  # noqa: SLF001 - what `poll` does with a message
+        commands.accept(topic, message, _NOW)
     except ConfigError as error:
         if '\n' in str(error):
             raise AssertionError(f'not one line: {error}') from None

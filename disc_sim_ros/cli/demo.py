@@ -20,7 +20,7 @@ from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
 
 if TYPE_CHECKING:
-    from disc_sim_ros.ros.client import Seen
+    from disc_sim_ros.ros.client import DiscSample
 
 WHOLE_FLIGHT = 3600.0  # s that --control acts without being renewed
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -201,12 +201,12 @@ class _Progress:
         sys.stderr.flush()
         self._open = False
 
-    def show(self, state: 'Seen') -> None:
+    def show(self, sample: 'DiscSample') -> None:
         """Show the state of the disc, on a terminal."""
         if self._live:
             sys.stderr.write(
-                f'\r  {state.time:5.1f} s  height {state.height:6.2f} m  '
-                f'speed {state.speed:5.2f} m/s '
+                f'\r  {sample.time:5.1f} s  height {sample.height:6.2f} m  '
+                f'speed {sample.speed:5.2f} m/s '
             )
             sys.stderr.flush()
             self._open = True

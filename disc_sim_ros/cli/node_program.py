@@ -1,11 +1,10 @@
 """The wrapper of the nodes' executables. It imports little: Ctrl-C must end them at any time."""
 
 from collections.abc import Callable, Sequence
-import os
-import signal
 import sys
 
 from disc_sim_ros import __version__
+from disc_sim_ros.ros.signals import exit_on_signal
 
 
 def run_node(
@@ -21,8 +20,7 @@ def run_node(
         arguments: Words of the command line; None for those of this process.
         prog: Name of the program.
     """
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os._exit(0))
+    exit_on_signal()
     words = sys.argv[1:] if arguments is None else list(arguments)
     if {'-h', '--help'} & set(words):
         sys.stdout.write(usage.format(prog=prog))

@@ -1,4 +1,4 @@
-"""Placeholder."""
+"""A node for programs that throw one disc: it waits for the nodes, throws and watches."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -27,20 +27,21 @@ from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.processes import Process
 
 START = 90.0  # s for the simulator to compile the equations, find the recorder and be recorded
-
-
 SERVICE = 30.0  # s for the simulator to answer
-
-
+_NODE_NAME = 'demo'
 _NOT_OF_THE_SIMULATION = ('/rosout', '/parameter_events')
-
-
-_TO_SEE = 0.1  # s between two looks at the disc
+_WATCH_PERIOD = 0.1  # s
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """The disc in the air: time since the release [s], height [m], speed [m/s]."""
+class DiscSample:
+    """The disc at one moment of its flight.
+
+    Attributes:
+        time: Simulated time since the first sample [s].
+        height: Of the centre above the ground [m].
+        speed: Over the ground [m/s].
+    """
 
     time: float
     height: float
@@ -54,36 +55,36 @@ class Watcher:
         self,
         domain: int,
         processes: tuple[Process, ...],
-        held: Callable[[], AbstractContextManager[None]] = nullcontext,
+        signals_held: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
-        """Join the domain.
+        """Join a ROS domain.
 
         Args:
-            domain: Of ROS.
-            processes: Watched while this waits.
-            held: Makes a block in which no signal raises an exception: within rclpy it would end
-                as an error of another kind.
+            domain: Number of the domain.
+            processes: Processes that must run while this waits.
+            signals_held: Makes a context in which no signal raises an exception: inside rclpy
+                the exception would end as one of another type.
         """
         self._processes = processes
-        self._held = held
+        self._signals_held = signals_held
         self._context = Context()
         rclpy.init(
             context=self._context,
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self._node = Node('demo', context=self._context, start_parameter_services=False)
+        self._node = Node(_NODE_NAME, context=self._context, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._events: list[str] = []
         self._odometry: Odometry | None = None
         self._applied: list[Any] = []
-        self._service = self._node.create_client(Trigger, 'sim_node/throw')
+        self._throw = self._node.create_client(Trigger, 'sim_node/throw')
         self._resume = self._node.create_client(Trigger, 'recorder_node/resume')
         self._node.create_subscription(
             DiagnosticStatus, topics.FLIGHT_EVENTS, self._on_event, qos.STATE_QOS
         )
-        # Only the newest counts: what nobody takes costs nothing here.
+        # Best effort, depth 1: messages that are not taken cost nothing here.
         newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._node.create_subscription(Odometry, topics.ODOM, self._on_odometry, newest)
         self._node.create_subscription(
@@ -100,27 +101,31 @@ class Watcher:
         self._context.try_shutdown()
 
     def wait_until_recorded(self, bag: Path) -> None:
-        """Wait until all that the simulator says is recorded, so that nothing of a throw is lost.
+        """Wait until a recorder records every topic of the simulator, and resume it.
 
-        The recorder was started paused: the bag shall begin with the disc, not with waiting.
+        The recorder was started paused, so that the bag does not begin with this wait.
 
         Raises:
             DiscSimError: It takes too long, or a process ended.
         """
         self._wait(self._is_ready, START, 'the simulator and a recorder of all its topics')
-        answers = []
+        futures = []
 
-        def resumed() -> bool:  # asked again: an answer to who is not known yet is dropped
-            answers.append(self._resume.call_async(Trigger.Request()))
+        def resumed() -> bool:  # repeated: a service drops its answer to a client not yet matched
+            futures.append(self._resume.call_async(Trigger.Request()))
             self._spin(0.2)
-            return any(answer.done() for answer in answers)
+            return any(future.done() for future in futures)
 
         self._wait(self._resume.service_is_ready, SERVICE, 'the services of the recorder')
         self._wait(resumed, SERVICE, 'an answer of the recorder')
         self._wait(lambda: _has(bag, f'/{topics.ODOM}'), START, 'the first messages in the bag')
 
     def steer(self, control: Control) -> None:
-        """Command coefficients, and wait until they act."""
+        """Command coefficients and wait until they act.
+
+        Raises:
+            DiscSimError: It takes too long, or a process ended.
+        """
         publisher = self._node.create_publisher(
             Vector3Stamped, topics.CMD_COEFFICIENTS, qos.COMMAND_QOS
         )
@@ -132,45 +137,58 @@ class Watcher:
         self._wait(lambda: self._applied, SERVICE, 'the command to act')
 
     def throw(self) -> None:
-        """Let the disc go."""
-        answer = self._service.call_async(Trigger.Request())
-        self._wait(answer.done, SERVICE, 'an answer of the simulator')
-        result = answer.result()
+        """Throw the disc.
+
+        Raises:
+            DiscSimError: The simulator refuses, it takes too long, or a process ended.
+        """
+        future = self._throw.call_async(Trigger.Request())
+        self._wait(future.done, SERVICE, 'an answer of the simulator')
+        result = future.result()
         if result is None or not result.success:
             raise DiscSimError(f'the simulator did not throw: {result and result.message}')
         self._wait(lambda: 'thrown' in self._events, SERVICE, 'the throw')
 
-    def watch(self, longest: float, tell: Callable[[Seen], None]) -> str:
-        """Watch the disc until it lies or the time [s] is up; return what ended it."""
+    def watch(self, longest: float, show: Callable[[DiscSample], None]) -> str:
+        """Watch the disc until it lands.
+
+        Args:
+            longest: Wall time to watch at most [s].
+            show: Called with each sample.
+
+        Returns:
+            What ended it: 'landed', 'failed' or 'time is up'.
+        """
         self._odometry = None
-        begun: float | None = None
+        begin: float | None = None
         end = time.monotonic() + longest
         while time.monotonic() < end:
-            self._spin(_TO_SEE)
+            self._spin(_WATCH_PERIOD)
             for event in ('landed', 'failed'):
                 if event in self._events:
                     return event
-            m = self._newest()
+            m = self._newest_odometry()
             if m is not None:
                 stamp = m.header.stamp.sec + m.header.stamp.nanosec * 1e-9
-                begun = stamp if begun is None else begun
+                begin = stamp if begin is None else begin
                 v = m.twist.twist.linear
-                tell(Seen(stamp - begun, m.pose.pose.position.z, math.hypot(v.x, v.y, v.z)))
+                speed = math.hypot(v.x, v.y, v.z)
+                show(DiscSample(stamp - begin, m.pose.pose.position.z, speed))
         return 'time is up'
 
-    def _newest(self) -> Odometry | None:
+    def _newest_odometry(self) -> Odometry | None:
         return self._odometry
 
     def _is_ready(self) -> bool:
-        """Say whether the simulator is there and all its topics have a recorder."""
+        """Return True if the simulator is there and all its topics have a recorder."""
         node = self._node
         if ('sim_node', '/') not in node.get_node_names_and_namespaces():
             return False
         names = [n for n, _ in node.get_publisher_names_and_types_by_node('sim_node', '/')]
-        if not self._service.service_is_ready() or f'/{topics.APPLIED_WIND}' not in names:
+        if not self._throw.service_is_ready() or f'/{topics.APPLIED_WIND}' not in names:
             return False
         return all(
-            any(s.node_name != 'demo' for s in node.get_subscriptions_info_by_topic(name))
+            any(s.node_name != _NODE_NAME for s in node.get_subscriptions_info_by_topic(name))
             for name in names
             if name not in _NOT_OF_THE_SIMULATION
         )
@@ -181,13 +199,13 @@ class Watcher:
             for process in self._processes:
                 process.check()
             if time.monotonic() > end:
-                raise DiscSimError(f'waited {longest:g} s in vain for {what}')
+                raise DiscSimError(f'timed out after {longest:g} s waiting for {what}')
             self._spin(0.05)
 
     def _spin(self, seconds: float) -> None:
-        """Take what has come, and let others work for the rest of the time."""
+        """Take the messages that have arrived, then sleep for the rest of the time."""
         end = time.monotonic() + seconds
-        with self._held():
+        with self._signals_held():
             self._executor.spin_once(seconds)
             for _ in range(10):
                 self._executor.spin_once(0.0)
@@ -201,9 +219,9 @@ class Watcher:
 
 
 def _has(bag: Path, topic: str) -> bool:
-    """Say whether there are messages of a topic on the disk already."""
+    """Return True if messages of a topic are on the disk."""
     try:
-        told = metadata.parse((bag / metadata.FILE_NAME).read_text(encoding='utf-8'))
+        information = metadata.parse((bag / metadata.FILE_NAME).read_text(encoding='utf-8'))
     except (OSError, BagError):
         return False
-    return any(info.topic.name == topic and info.message_count for info in told.topics)
+    return any(info.topic.name == topic and info.message_count for info in information.topics)

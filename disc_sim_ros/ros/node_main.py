@@ -1,30 +1,77 @@
-"""What the programs of this package have in common: signals, start and service of ROS, errors."""
+"""What the `main` of each node shares: signals, the start of ROS, the executor, exit codes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+import gc
 import re
-import signal
+import sys
 import threading
 import time
+from typing import Protocol
 
 import rclpy
-from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import ok, remove_ros_args
+from rclpy.utilities import ok, remove_ros_args, try_shutdown
 
-from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
+from disc_sim_ros.ros.signals import exit_on_signal, on_signal
 
-LONGEST_WAIT = 0.5  # s until a signal is heard
+LONGEST_WAIT = 0.5  # s until a signal takes effect
+_FATAL, _UNSET = 50, 0  # log levels of rcl
 
 
-def on_signal(handler: Callable[..., object]) -> None:
-    """Have Ctrl-C and SIGTERM handled from now on."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, handler)
+class ProgramNode(Protocol):
+    """What `run` needs of a node, beside `rclpy.node.Node`."""
+
+    @property
+    def is_working(self) -> bool:
+        """Return False once the node cannot go on."""
+
+    def start(self) -> None:
+        """Start the threads of the node."""
+
+    def stop(self) -> str:
+        """End them; return a last line for people, or ''; raise DiscSimError if they failed."""
+
+    def destroy_node(self) -> None:
+        """Leave the graph."""
+
+
+def run(program: str, make_node: Callable[[], ProgramNode], args: Sequence[str] | None) -> int:
+    """Run a node until Ctrl-C, SIGTERM or its own end.
+
+    Args:
+        program: Name of the program, which stands before each line on stderr.
+        make_node: Makes the node.
+        args: Arguments with the name of the program first; those of the process where None.
+
+    Returns:
+        The exit code: 0, 1 if the node failed, 2 for bad arguments or parameters.
+    """
+    exit_on_signal()
+    signals: list[int] = []  # not an Event: a handler may interrupt itself
+    try:
+        init(list(sys.argv if args is None else args))
+        on_signal(lambda number, _: signals.append(number))
+        node = make_node()
+    except (DiscSimError, ParameterException, RuntimeError) as error:  # rclpy's are RuntimeErrors
+        sys.stderr.write(f'{program}: error: {one_line(error)}\n')
+        try_shutdown()
+        return 1 if isinstance(error, BagError) and not isinstance(error, ConfigError) else 2
+    gc.collect()
+    gc.freeze()  # a full collection would stall the node for tens of milliseconds
+    node.start()
+    try:
+        serve(node, lambda: not signals and node.is_working)  # type: ignore[arg-type]
+    finally:
+        code = _stop(program, node)
+        node.destroy_node()
+        try_shutdown()
+    return code
 
 
 def init(args: list[str]) -> None:
@@ -32,32 +79,32 @@ def init(args: list[str]) -> None:
 
     Raises:
         ConfigError: An argument that is not for ROS.
-        RuntimeError: ROS does not understand an argument.
+        RuntimeError: ROS does not accept an argument.
     """
-    set_logger_level('rcl', LoggingSeverity.FATAL)  # it would tell a part of the error, too
+    set_logger_level('rcl', _FATAL)  # it would print a part of the error, too
     other = remove_ros_args(args)[1:]
     if other:
         raise ConfigError(
             'arguments', ' '.join(other), 'parameters are -p NAME:=VALUE after --ros-args'
         )
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    set_logger_level('rcl', LoggingSeverity.UNSET)
+    set_logger_level('rcl', _UNSET)
 
 
-def serve(node: Node, goes_on: Callable[[], bool]) -> None:
-    """Take messages and calls of a node as long as asked to, whatever the wall clock does.
+def serve(node: Node, keep_running: Callable[[], bool]) -> None:
+    """Run the callbacks of a node while `keep_running()`, even if the wall clock is set.
 
-    The DDS of the wheels on PyPI waits until a time of the wall clock. Where that is set back
-    meanwhile, a wait of half a second takes as long as it was set back, and with it timers,
-    services and Ctrl-C: so a thread that sleeps by the steady clock ends every wait.
+    The DDS of the wheels on PyPI waits until a time of the wall clock. If that clock is set back
+    meanwhile, a wait of half a second takes as much longer, and with it timers, services and
+    Ctrl-C. So a thread that sleeps by the steady clock ends every wait.
     """
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     threading.Thread(target=_wake, args=(executor,), daemon=True).start()
     try:
-        while goes_on():
+        while keep_running():
             executor.spin_once(LONGEST_WAIT)
-    except RCLError:
+    except RuntimeError:  # rclpy's, if another thread has shut ROS down
         if ok():
             raise
     finally:
@@ -65,14 +112,25 @@ def serve(node: Node, goes_on: Callable[[], bool]) -> None:
 
 
 def _wake(executor: SingleThreadedExecutor) -> None:
-    with suppress(InvalidHandle, RCLError):  # the end
+    with suppress(RuntimeError):  # rclpy's, once the executor is shut down
         while executor.get_nodes():
             executor.wake()
             time.sleep(LONGEST_WAIT)
 
 
-def plainly(error: Exception) -> str:
-    """Return an error as one line, without where in the sources of ROS it was found."""
+def _stop(program: str, node: ProgramNode) -> int:
+    try:
+        last_line = node.stop()
+    except DiscSimError as error:
+        sys.stderr.write(f'{program}: error: {error}\n')
+        return 1
+    if last_line:
+        sys.stderr.write(f'{program}: {last_line}\n')
+    return 0
+
+
+def one_line(error: Exception) -> str:
+    """Return an error as one line, without its place in the sources of ROS."""
     text = ' '.join(re.sub(r', at /[^\s,]+', '', str(error)).split())
     if type(error).__name__ == 'UnknownROSArgsError':
         return f'unknown arguments after --ros-args: {text}'

@@ -8,6 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.ros.internals import parameter_overrides
 from disc_sim_ros.ros.parameter_spec import (
     ParameterSpec,
     Value,
@@ -46,7 +47,7 @@ def declare(node: Node, table: Sequence[ParameterSpec]) -> None:
     """
     given = {
         name: value
-        for name, value in _overrides(node).items()
+        for name, value in parameter_overrides(node, [spec.name for spec in table]).items()
         if name not in _OF_ROS and not name.startswith(_QOS)
     }
     initial = checked(given, table)
@@ -64,7 +65,7 @@ def refuse_unused(node: Node) -> None:
         ConfigError: A value is given for a parameter that is not declared.
     """
     declared = node.list_parameters([], depth=0).names
-    for name, value in _overrides(node).items():
+    for name, value in parameter_overrides(node, declared).items():
         if name not in declared:
             raise ConfigError(name, value, no_such(name, declared))
 
@@ -119,11 +120,6 @@ def _wide(change: Parameter, default: Value | None) -> Parameter:
     else:
         return change
     return Parameter(change.name, value=wide)
-
-
-def _overrides(node: Node) -> dict[str, object]:
-    """Return the values from files, command line and constructor; rclpy keeps them private."""
-    return {p.name: p.value for p in node._parameter_overrides.values()}  # noqa: SLF001
 
 
 def descriptor(spec: ParameterSpec) -> ParameterDescriptor:

@@ -1,6 +1,6 @@
-"""Where messages go: what `outputs.Outputs` needs of it, and the one that is publishers of a node.
+"""Where the messages of the simulator go: a sink for each topic.
 
-`flight_bag` has another one, which writes the same messages into a bag.
+`PublisherSink` publishes on a node; `sim.offline_bag.BagSink` writes the same messages to a bag.
 """
 
 from typing import Any, Protocol
@@ -15,82 +15,87 @@ from disc_sim_ros.ros.cdr_template import CdrTemplate
 
 
 class Sink(Protocol):
-    """One topic and whether anybody listens, which costs nothing to ask.
+    """One topic.
 
     Attributes:
-        heard: Whether the topic has a subscriber.
+        has_subscribers: Whether anything would take a message; reading it costs nothing.
     """
 
-    heard: bool
+    has_subscribers: bool
 
     def send(self, seconds: int, nanoseconds: int, *values: float) -> None:
         """Publish the template with a stamp and values; see `cdr_template.CdrTemplate`."""
 
     def publish(self, message: Any) -> None:
-        """Publish a message that was built whole, or its bytes."""
+        """Publish a complete message, or its serialised bytes."""
 
 
 class SinkFactory(Protocol):
-    """Makes channels.
+    """Makes the sinks of one simulator.
 
     Attributes:
-        name: Of who publishes, with namespace and without a slash in front.
+        node_name: Name of the node that publishes, with namespace, without the leading slash.
     """
 
-    name: str
+    node_name: str
 
-    def channel(
-        self, kind: type, name: str, qos: QoSProfile, wire: CdrTemplate | None = None
+    def sink(
+        self, message_type: type, name: str, qos: QoSProfile, template: CdrTemplate | None = None
     ) -> Sink:
-        """Return a channel for a type of messages, with their template where they have one."""
+        """Return a new sink for messages of a type, with the template that `send` fills."""
 
 
 class PublisherSink:
-    """A channel that is a publisher of a node, whose QoS can be overridden by parameters.
+    """A sink that is a publisher of a node; parameters of the node can override its QoS.
 
     Attributes:
-        heard: Whether the topic has a subscriber.
+        has_subscribers: Whether the topic has a subscriber.
     """
 
     def __init__(
-        self, node: Node, kind: type, name: str, qos: QoSProfile, wire: CdrTemplate | None = None
+        self,
+        node: Node,
+        message_type: type,
+        name: str,
+        qos: QoSProfile,
+        template: CdrTemplate | None = None,
     ) -> None:
-        self.heard = False
+        self.has_subscribers = False
         self.publisher: Publisher = node.create_publisher(
-            kind,
+            message_type,
             name,
             qos,
             event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
-        self._pack = wire.pack if wire is not None else None
+        self._pack = template.pack if template is not None else None
         self._publish = self.publisher.publish
 
     def send(self, seconds: int, nanoseconds: int, *values: float) -> None:
-        """Publish the patched template."""
+        """Publish the filled template."""
         self._publish(self._pack(seconds, nanoseconds, *values))  # type: ignore[misc]
 
     def publish(self, message: Any) -> None:
-        """Publish a message that was built whole."""
+        """Publish a complete message, or its serialised bytes."""
         self._publish(message)
 
     def _on_matched(self, status: Any) -> None:
-        self.heard = status.current_count > 0
+        self.has_subscribers = status.current_count > 0
 
 
 class PublisherSinkFactory:
-    """The publishers of a node.
+    """Makes publishers of a node.
 
     Attributes:
-        name: Of the node.
+        node_name: Name of the node, with namespace, without the leading slash.
     """
 
     def __init__(self, node: Node) -> None:
-        self.name = node.get_fully_qualified_name()[1:]
+        self.node_name = node.get_fully_qualified_name()[1:]
         self._node = node
 
-    def channel(
-        self, kind: type, name: str, qos: QoSProfile, wire: CdrTemplate | None = None
+    def sink(
+        self, message_type: type, name: str, qos: QoSProfile, template: CdrTemplate | None = None
     ) -> PublisherSink:
         """Return a new publisher."""
-        return PublisherSink(self._node, kind, name, qos, wire)
+        return PublisherSink(self._node, message_type, name, qos, template)

@@ -9,7 +9,7 @@ from disc_sim_ros.ros.qos import STATE_QOS
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import configuration
 from disc_sim_ros.ros.sim.offline_bag import BagSinkFactory
-from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.simulation import Simulation
 from disc_sim_ros.topics import Frames
 
@@ -42,11 +42,11 @@ class Made:
     def __init__(self, writer, **changes):
         config = configuration(PARAMETERS | changes)
         frames = Frames.prefixed(config.frame_prefix)
-        self.medium = BagSinkFactory(writer)
-        self.medium.now = START
-        outputs = Outputs(self.medium, frames, with_clock=False)
+        self.factory = BagSinkFactory(writer)
+        self.factory.now = START
+        publishers = Publishers(self.factory, frames, with_clock=False)
         self.commands = Commands(None, frames)
-        self.simulation = Simulation(config, outputs, self.commands, START, self._warn)
+        self.simulation = Simulation(config, publishers, self.commands, START, self._warn)
         self.every = config.steps_per_publish
         self.requests = []
 
@@ -58,15 +58,15 @@ class Made:
     def go(self, seconds):
         """Fly on, as the thread of sim_node does."""
         simulation = self.simulation
-        end = simulation.timeline.now + round(seconds * SECOND)
-        while simulation.timeline.now < end:
-            self.medium.now = simulation.timeline.now
-            simulation.leap(self.every)
-            self.medium.now = simulation.timeline.now
+        end = simulation.clock.now + round(seconds * SECOND)
+        while simulation.clock.now < end:
+            self.factory.now = simulation.clock.now
+            simulation.advance(self.every)
+            self.factory.now = simulation.clock.now
             if simulation.at_message:
                 while self.requests:
                     self.requests.pop()()
-                simulation.arrive()
+                simulation.publish_step()
 
     @staticmethod
     def _warn(text, _=''):

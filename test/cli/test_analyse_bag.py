@@ -195,7 +195,7 @@ def test_a_change_of_the_wind_profile_is_named(document, tmp_path):
 
     rougher = {'wind.roughness_length': 0.8}
     with BagWriter(tmp_path / 'bag') as writer:
-        events = bags.BagSinkFactory(writer).channel(ParameterEvent, '/parameter_events', bags.QOS)
+        events = bags.BagSinkFactory(writer).sink(ParameterEvent, '/parameter_events', bags.QOS)
         made = bags.Made(writer)
         made.go(0.2)
         made.requests.append(
@@ -203,8 +203,8 @@ def test_a_change_of_the_wind_profile_is_named(document, tmp_path):
         )
         changed = [Parameter(name='wind.roughness_length')]
         told = ParameterEvent(node='/sim_node', changed_parameters=changed)
-        now = made.simulation.timeline.now
-        writer.write(events._topic, serialize_message(told), now, now)
+        now = made.simulation.clock.now
+        writer.write(events._topic_id, serialize_message(told), now, now)
         made.go(0.2)
     code, found = document(tmp_path / 'bag', '--verify')
     assert code == 3

@@ -81,34 +81,32 @@ def types_of_topics() -> dict[str, str]:
             return '/sim_node'
 
     note = Note()
-    publishers.Outputs(PublisherSinkFactory(note), Frames(), with_clock=True)
+    publishers.Publishers(PublisherSinkFactory(note), Frames(), with_clock=True)
     Commands(note, Frames())
     return note.types
 
 
 def test_latched_topics_are_called_so():
-    latched = set(
-        re.findall(r'topics\.(\w+), (?:ros_)?qos\.LATCHED_QOS', source('sim/publishers'))
-    )
+    latched = set(re.findall(r'topics\.(\w+), qos\.LATCHED_QOS', source('sim/publishers')))
     told = {row[0].strip('`') for row in rows('Published') if 'latched' in row[-1]}
     assert told == {getattr(topics, name) for name in latched}
     assert len(told) == 4
 
 
 def test_every_service_is_there_and_no_other():
-    made = re.findall(r"create_service\((\w+), '([^']+)'", source('sim/node'))
+    made = re.findall(r"create_service\((\w+), '([^']+)'", source('sim/services'))
     told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Services')}
     assert told == {name: kind for kind, name in made}
 
 
 def test_every_event_is_there_and_no_other():
-    assert set(named('Events')) == set(re.findall(r"_event\('([^']+)'", source('sim/simulation')))
+    assert set(named('Events')) == set(re.findall(r"Event\('([^']+)'", source('sim/events')))
 
 
 def test_every_value_of_an_event_is_there():
     events = re.split('^### Events$', PAGE, flags=re.MULTILINE)[1].partition('\n## ')[0]
     told = set(re.findall(r'`(\w+)`', events))
-    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim/simulation'))
+    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim/events'))
     assert set(made) <= told
 
 

@@ -79,8 +79,8 @@ def landings(events: list[DiagnosticStatus]) -> list[DiagnosticStatus]:
 @pytest.mark.parametrize('namespace', ['', '/red'])
 def test_throw_throws_what_the_core_flies(ros, namespace):
     ros.start(WAITING, namespace=namespace)
-    events = ros.listen(DiagnosticStatus, f'{namespace}/{topics.FLIGHT_EVENTS}')
-    odometry = ros.listen(Odometry, f'{namespace}/{topics.ODOM}')
+    events = ros.subscribe(DiagnosticStatus, f'{namespace}/{topics.FLIGHT_EVENTS}')
+    odometry = ros.subscribe(Odometry, f'{namespace}/{topics.ODOM}')
     ros.spin_until(lambda: odometry, 'odometry')  # then it knows of both subscriptions
     launch = {'speed': 18.0, 'pitch': 12.0, 'roll': 7.0, 'yaw': 25.0, 'spin': 40.0, 'height': 1.2}
     options = itertools.chain(*((f'--{name}', str(value)) for name, value in launch.items()))

@@ -18,7 +18,7 @@ from disc_sim_ros import topics
 from disc_sim_ros.physics import frames as paper_frames
 from disc_sim_ros.physics.flight import fly
 from disc_sim_ros.ros.sim.config import configuration
-from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.topics import Frames
 
 ROOT = Path(__file__).parents[2]
@@ -78,20 +78,20 @@ def test_colours_are_colours():
 class Kinds:
     """Topics without a network; keeps their types."""
 
-    name = 'sim_node'
+    node_name = 'sim_node'
 
     def __init__(self):
         self.of = {}
 
-    def channel(self, kind, name, qos, wire=None):
-        self.of[name if name.startswith('/') else f'/{name}'] = kind
-        return type('Channel', (), {'publish': None})()
+    def sink(self, message_type, name, qos, template=None):
+        self.of[name if name.startswith('/') else f'/{name}'] = message_type
+        return type('Sink', (), {'publish': None})()
 
 
 @pytest.fixture(scope='module')
 def kinds() -> dict[str, type]:
     found = Kinds()
-    Outputs(found, Frames(), with_clock=True)
+    Publishers(found, Frames(), with_clock=True)
     return found.of
 
 

@@ -235,7 +235,7 @@ def test_the_recorder_is_given_time_before_the_throw(load, namespace, service):
     assert later.kwargs['period'] == 3.0
     (call,) = later.kwargs['actions']
     assert call.kwargs['cmd'] == ['ros2', 'service', 'call', service, 'std_srvs/srv/Trigger']
-    source = (ROOT / PACKAGE / 'ros/sim/node.py').read_text(encoding='utf-8')
+    source = (ROOT / PACKAGE / 'ros/sim/services.py').read_text(encoding='utf-8')
     assert "create_service(Trigger, '~/throw'" in source
     given.launch_configurations['throw_after'] = '-1'
     assert len(module.record_and_throw(given)) == 1

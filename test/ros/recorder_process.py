@@ -1,7 +1,6 @@
 """A recorder in a process of its own, and topics of counted messages to record."""
 
 from collections.abc import Mapping
-import itertools
 from pathlib import Path
 import signal
 import struct
@@ -17,7 +16,7 @@ from disc_sim_ros.bags.reader import open_bag
 from ros.sim_process import DEADLINE, Harness
 
 RELIABLE = QoSProfile(depth=20_000)
-_MAIN = 'from disc_sim_ros.cli.recorder_node import main\nsys.exit(main())'
+_MAIN = 'import runpy\nrunpy.run_module("disc_sim_ros.ros.recorder")'
 COUNT = struct.Struct('<4xq')  # a serialised std_msgs/Int64
 
 
@@ -32,7 +31,7 @@ class Recorder:
     def __init__(
         self, ros: Harness, bag: Path, parameters: Mapping[str, object], before: str = ''
     ) -> None:
-        """Start it; `before` is Python to run in its process first."""
+        """Start it; `before` is Python code that its process runs first."""
         self.bag = bag
         self._ros = ros
         self._log = bag.with_name(f'{bag.name}.log')
@@ -45,22 +44,23 @@ class Recorder:
             self.process = subprocess.Popen(command, stdout=log, stderr=log)
 
     @property
-    def said(self) -> str:
+    def log(self) -> str:
+        """Return its output so far."""
         return self._log.read_text()
 
-    def wait_for(self, text: str) -> None:
-        """Wait until it has said something."""
-        self._ros.spin_until(lambda: text in self.said, f'{text!r} in: {self.said}')
+    def wait_for_log(self, text: str) -> None:
+        """Wait until its output has a text."""
+        self._ros.spin_until(lambda: text in self.log, f'{text!r} in: {self.log}')
 
-    def listens_to(self, *names: str) -> None:
+    def wait_for_topics(self, *names: str) -> None:
         """Wait until it has subscribed to topics."""
-        self.wait_for('recording')
+        self.wait_for_log('recording')
         for name in names:
             self._ros.spin_until(lambda n=name: n in self._recorded(), f'{name} recorded')
 
     def _recorded(self) -> set[str]:
         lines = [
-            line for line in self.said.splitlines() if '] [recorder_node]: recording /' in line
+            line for line in self.log.splitlines() if '] [recorder_node]: recording /' in line
         ]
         return {n for line in lines for n in line.split(': recording ')[1].split(', ')}
 
@@ -70,7 +70,7 @@ class Recorder:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-            pytest.fail(f'the recorder did not end within {DEADLINE:g} s:\n{self.said}')
+            pytest.fail(f'the recorder did not end within {DEADLINE:g} s:\n{self.log}')
 
     def end(self, number: signal.Signals = signal.SIGINT) -> int:
         self.process.send_signal(number)
@@ -78,27 +78,31 @@ class Recorder:
 
 
 class Counter:
-    """Publishes 0, 1, 2, ... on a topic, and knows when each was sent."""
+    """Publishes 0, 1, 2, ... on a topic.
+
+    Attributes:
+        topic: Name of the topic.
+        sent: When each message was published, by the monotonic clock [s].
+    """
 
     def __init__(self, ros: Harness, topic: str, qos: QoSProfile = RELIABLE) -> None:
         self.topic = topic
-        self.sent: list[float] = []  # when, by the monotonic clock
+        self.sent: list[float] = []
         self._publisher = ros.node.create_publisher(Int64, topic, qos)
         self._ros = ros
 
-    def heard_by(self, count: int) -> None:
-        """Wait until some subscriptions are matched."""
+    def wait_for_subscriptions(self, count: int) -> None:
+        """Wait until so many subscriptions are matched."""
         self._ros.spin_until(
-            lambda: self._publisher.get_subscription_count() >= count, f'{self.topic} heard'
+            lambda: self._publisher.get_subscription_count() >= count,
+            f'{count} subscriptions to {self.topic}',
         )
 
     def publish(self, count: int, rate: float = 2000.0) -> None:
-        """Publish messages, so many a second at most."""
-        begun = time.monotonic()
-        for n in itertools.count():
-            if n == count:
-                return
-            time.sleep(max(begun + n / rate - time.monotonic(), 0.0))
+        """Publish messages, at most `rate` a second."""
+        start = time.monotonic()
+        for n in range(count):
+            time.sleep(max(start + n / rate - time.monotonic(), 0.0))
             self.publish_one()
 
     def publish_one(self) -> None:

@@ -22,7 +22,7 @@ from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 DEADLINE = 60.0  # s of wall time for what takes less than one on an idle machine
-ALL_QOS = QoSProfile(depth=100_000)  # reliable: a test that is slow to listen loses nothing
+ALL_QOS = QoSProfile(depth=100_000)  # reliable: a slow test loses nothing
 
 
 class SimProcess:
@@ -34,9 +34,16 @@ class SimProcess:
     """
 
     def __init__(
-        self, parameters: Mapping[str, object], arguments: tuple[str, ...], name: str, stderr: Path
+        self,
+        parameters: Mapping[str, object],
+        arguments: tuple[str, ...],
+        name: str,
+        stderr: Path,
+        before: str = '',
     ) -> None:
-        command = [sys.executable, '-m', 'disc_sim_ros.ros.sim.node', '--ros-args']
+        """Start it; `before` is Python code that its process runs first."""
+        program = f'{before}\nimport runpy\nrunpy.run_module("disc_sim_ros.ros.sim")'
+        command = [sys.executable, '-c', program, '--ros-args']
         for key, value in parameters.items():
             command += ['-p', f'{key}:={str(value).lower() if isinstance(value, bool) else value}']
         self.name = name
@@ -46,7 +53,7 @@ class SimProcess:
 
     @property
     def stderr(self) -> str:
-        """What it has written so far, to stdout as well."""
+        """Return what it has written so far, to stdout as well."""
         return self._stderr.read_text()
 
     def wait(self) -> int:
@@ -70,8 +77,8 @@ class Harness:
     At the end of its `with` block the simulators that still run get SIGINT and must end with 0.
 
     Attributes:
-        node: A node to make more with.
-        sims: What has been started.
+        node: The node, to create publishers and clients with.
+        sims: The simulators.
     """
 
     def __init__(self, context: Context, folder: Path) -> None:
@@ -82,8 +89,8 @@ class Harness:
         self._folder = folder
         self._clients: dict[str, Client] = {}
         self._parameters: dict[SimProcess, AsyncParameterClient] = {}
-        self._reached: set[str] = set()  # names of simulators that know all that was made
-        self._heard: list[list[Any]] = []
+        self._reached: set[str] = set()  # names of simulators that have matched all endpoints
+        self._received: list[list[Any]] = []
         self._since = 0
 
     def __enter__(self) -> 'Harness':
@@ -100,13 +107,17 @@ class Harness:
             assert not any(codes.values()), f'{codes}\n{self._outputs()}'
 
     def start(
-        self, parameters: Mapping[str, object], *arguments: str, namespace: str = ''
+        self,
+        parameters: Mapping[str, object],
+        *arguments: str,
+        namespace: str = '',
+        before: str = '',
     ) -> SimProcess:
-        """Start a simulator with parameters and more arguments of ROS; do not wait for it."""
+        """Start a simulator with parameters and more ROS arguments; do not wait for it."""
         if namespace:
             arguments += ('-r', f'__ns:={namespace}')
         stderr = self._folder / f'sim_{len(self.sims)}.txt'
-        sim = SimProcess(parameters, arguments, f'{namespace}/sim_node', stderr)
+        sim = SimProcess(parameters, arguments, f'{namespace}/sim_node', stderr, before)
         self.sims.append(sim)
         self._client(sim, 'pause', SetBool)
         for service in ('throw', 'reset', 'step'):
@@ -124,53 +135,59 @@ class Harness:
                 pytest.fail(f'not within {deadline:g} s: {what or condition}\n{self._outputs()}')
             self._executor.spin_once(0.02)
 
-    def listen(
-        self, kind: type, topic: str, *, raw: bool = False, qos: QoSProfile = ALL_QOS
+    def subscribe(
+        self, message_type: type, topic: str, *, raw: bool = False, qos: QoSProfile = ALL_QOS
     ) -> list[Any]:
         """Return a list to which every message of a topic will be added, as bytes where `raw`."""
-        heard: list[Any] = []
+        received: list[Any] = []
 
-        def hear(message: Any, info: Mapping[str, int]) -> None:
+        def take(message: Any, info: Mapping[str, int]) -> None:
             if info['source_timestamp'] > self._since:
-                heard.append(message)
+                received.append(message)
 
-        self.node.create_subscription(kind, topic, hear, qos, raw=raw)
-        self._heard.append(heard)
+        self.node.create_subscription(message_type, topic, take, qos, raw=raw)
+        self._received.append(received)
         self._reached.clear()
-        return heard
+        return received
 
     def forget(self) -> None:
-        """Drop all that was published until now, also what is still on its way."""
+        """Discard all messages published until now, also those on their way."""
         self._since = time.time_ns()
-        for heard in self._heard:
-            heard.clear()
+        for received in self._received:
+            received.clear()
 
-    def publisher(self, kind: type, topic: str) -> Publisher:
+    def publisher(self, message_type: type, topic: str) -> Publisher:
         """Return a publisher that a simulator has subscribed to."""
-        publisher = self.node.create_publisher(kind, topic, 1000)
+        publisher = self.node.create_publisher(message_type, topic, 1000)
         self._reached.clear()
         self.spin_until(publisher.get_subscription_count, f'a subscriber of {topic}')
         return publisher
 
     def send(self, sim: SimProcess, publisher: Publisher, *messages: Any) -> None:
-        """Publish messages to a simulator and wait until they are there."""
+        """Publish messages to a simulator and wait until they have arrived."""
         self._reach(sim)
         self.spin_until(publisher.get_subscription_count, f'a subscriber of {publisher.topic}')
         for message in messages:
             publisher.publish(message)
-        # What is sent later arrives later. To wait for DDS to acknowledge takes 3 s.
+        # A later request arrives later. To wait until DDS acknowledges takes 3 s.
         self._result(sim, self._parameters[sim].get_parameters(['use_sim_time']))
 
-    def call(self, sim: SimProcess, service: str, kind: type = Trigger, **fields: Any) -> Any:
+    def call(
+        self, sim: SimProcess, service: str, service_type: type = Trigger, **fields: Any
+    ) -> Any:
         """Call a service of a simulator, such as 'throw', and return the response."""
-        client = self._client(sim, service, kind)
+        client = self._client(sim, service, service_type)
         self._reach(sim)
         self.spin_until(client.service_is_ready, f'the service {client.srv_name}')
-        return self._result(sim, client.call_async(kind.Request(**fields)))
+        return self._result(sim, client.call_async(service_type.Request(**fields)))
 
-    def pause(self, sim: SimProcess, *, still: bool = True) -> None:
-        """Let the time of a simulator stand still, or go on."""
-        assert self.call(sim, 'pause', SetBool, data=still).success
+    def pause(self, sim: SimProcess) -> None:
+        """Pause a simulator."""
+        assert self.call(sim, 'pause', SetBool, data=True).success
+
+    def resume(self, sim: SimProcess) -> None:
+        """Let the time of a paused simulator go on."""
+        assert self.call(sim, 'pause', SetBool, data=False).success
 
     def set(self, sim: SimProcess, parameters: Mapping[str, object]) -> Any:
         """Set parameters of a simulator together; return rcl_interfaces/SetParametersResult."""
@@ -180,37 +197,37 @@ class Harness:
         changes = [Parameter(key, value=x).to_parameter_msg() for key, x in parameters.items()]
         return self._result(sim, client.set_parameters_atomically(changes)).result
 
-    def _client(self, sim: SimProcess, service: str, kind: type) -> Client:
+    def _client(self, sim: SimProcess, service: str, service_type: type) -> Client:
         name = f'{sim.name}/{service}'
         if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, name)
+            self._clients[name] = self.node.create_client(service_type, name)
             self._reached.discard(sim.name)
         return self._clients[name]
 
     def _reach(self, sim: SimProcess) -> None:
-        """Wait until a simulator knows all that has been made here so far.
+        """Wait until a simulator has matched all endpoints that were created here so far.
 
-        It publishes to no subscription, and answers no client, that it does not know yet, and a
-        first command takes its time. Discovery keeps their order: when it has answered the
-        youngest client, it knows all that is older.
+        Before that it publishes nothing to a subscription and drops its responses to a client.
+        Discovery keeps the order: once it answers the youngest client, the older endpoints are
+        matched.
         """
         if sim.name in self._reached:
             return
         client = self.node.create_client(GetParameters, f'{sim.name}/get_parameters')
-        answers: list[Future] = []
+        futures: list[Future] = []
 
         def answered() -> bool:
-            return any(answer.done() for answer in answers)
+            return any(future.done() for future in futures)
 
-        def asked() -> bool:
-            answers.append(client.call_async(GetParameters.Request()))
+        def call_until_answered() -> bool:
+            futures.append(client.call_async(GetParameters.Request()))
             patience = time.monotonic() + 0.2
             while not answered() and time.monotonic() < patience:
                 self._executor.spin_once(0.02)
             return answered()
 
         self.spin_until(client.service_is_ready, f'the service {client.srv_name}')
-        self.spin_until(asked, f'an answer of {sim.name}')
+        self.spin_until(call_until_answered, f'an answer of {sim.name}')
         self.node.destroy_client(client)
         self._reached.add(sim.name)
 

@@ -1,7 +1,7 @@
-"""What happens around a node that runs for weeks must not reach the flight.
+"""Faults around a node must not affect the flight.
 
-Each flight is compared with the core's to the last bit, its stamps have to be even, and what the
-diagnostics tell has to be true. How quick the machine is, no test here asks.
+Each flight is compared with that of `physics` to the last bit, its stamps must be evenly spaced,
+and the diagnostics must be true. No test depends on the speed of the machine.
 """
 
 from decimal import Decimal
@@ -50,7 +50,7 @@ STATE = [*range(7), *range(43, 49)]  # pose and twist among them
 
 
 def ns(message: bytes) -> int:
-    """The stamp of a serialised message that begins with a header."""
+    """Return the stamp of a serialised message that begins with a header [ns]."""
     seconds, nanoseconds = struct.unpack_from('<iI', message, 4)
     return seconds * 1_000_000_000 + nanoseconds
 
@@ -60,79 +60,80 @@ def values_of(event):
 
 
 def computed(period):
-    """Pose and twist while in the air, a period [ns] apart, as the core has them."""
+    """Return pose and twist of `FlightSimulator` in the air, a period [ns] apart."""
     disc = FlightSimulator(SETUP, LAUNCH.state())
-    found = []
+    rows = []
     for _ in range(math.ceil(EXPECTED.time * 1e9 / period)):
-        found.append(messages.odometry(disc.state))
+        rows.append(messages.odometry(disc.state))
         disc.advance(period // 1_000_000)
-    return np.array(found)
+    return np.array(rows)
 
 
 class Flight:
-    """A flight under way, and what is heard of it."""
+    """A simulator, and the messages that it publishes."""
 
     def __init__(self, ros, sim):
         self.ros, self.sim = ros, sim
-        self.events = ros.listen(DiagnosticStatus, topics.FLIGHT_EVENTS)
-        self.odom = ros.listen(Odometry, topics.ODOM, raw=True)
-        self.diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
-        self.told = {}
+        self.events = ros.subscribe(DiagnosticStatus, topics.FLIGHT_EVENTS)
+        self.odom = ros.subscribe(Odometry, topics.ODOM, raw=True)
+        self.diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
         ros.spin_until(lambda: self.odom and self.diagnostics, 'the simulator')
 
     def throw(self):
         assert self.ros.call(self.sim, 'throw').success
 
     def goes_on(self, seconds):
-        """Wait for so much more of simulated time."""
+        """Wait for so many more seconds of simulated time."""
         until = ns(self.odom[-1]) + seconds * 1e9
         self.ros.spin_until(lambda: ns(self.odom[-1]) >= until, f'{seconds} s more')
 
     def offset(self):
         """Wait 0.5 s of simulated time; return by how much it is behind the steady clock [s]."""
-        least, seen = math.inf, len(self.odom)
+        least, count = math.inf, len(self.odom)
         until = ns(self.odom[-1]) + 0.5e9
         while ns(self.odom[-1]) < until:
-            self.ros.spin_until(lambda old=seen: len(self.odom) > old, 'odom')
-            seen = len(self.odom)
+            self.ros.spin_until(lambda old=count: len(self.odom) > old, 'odom')
+            count = len(self.odom)
             least = min(least, time.monotonic() - ns(self.odom[-1]) * 1e-9)
         return least
 
     def behind(self):
-        """Return `offset`, and what is told as slipped, of a time without a slip [s]."""
-        told = float(self.tells()[1]['slipped_s'])
-        for _ in range(30):  # a busy machine may hold it up at any time
-            offset, before = self.offset(), told
-            told = float(self.tells()[1]['slipped_s'])
-            if told == before:
-                return offset, told
+        """Return `offset`, and the reported `slipped_s`, of a time without a slip [s]."""
+        slipped = float(self.next_diagnostics()[1]['slipped_s'])
+        for _ in range(30):  # a busy machine may stall it at any time
+            offset, before = self.offset(), slipped
+            slipped = float(self.next_diagnostics()[1]['slipped_s'])
+            if slipped == before:
+                return offset, slipped
         pytest.fail('never a second without a slip')
 
-    def tells(self):
-        """Wait for the next diagnostics, and return them."""
+    def next_diagnostics(self):
+        """Wait for the next diagnostics of the simulator; return status and values."""
         self.diagnostics.clear()
-        found = []
+        statuses = []
 
-        def heard():  # a recorder tells of itself, too
-            found[:] = [m.status[0] for m in self.diagnostics if m.status[0].hardware_id == 'disc']
-            return found
+        def arrived():  # a recorder publishes diagnostics, too
+            statuses[:] = [
+                m.status[0] for m in self.diagnostics if m.status[0].hardware_id == 'disc'
+            ]
+            return statuses
 
-        self.ros.spin_until(heard, 'diagnostics')
-        return found[-1], values_of(found[-1])
+        self.ros.spin_until(arrived, 'diagnostics')
+        return statuses[-1], values_of(statuses[-1])
 
     def event(self, name):
-        """Wait for an event; return the values of the last of them."""
-        found = []
+        """Wait for an event; return the values of the last one."""
+        events = []
 
-        def heard():
-            found[:] = [e for e in self.events if e.name.endswith(f': {name}')]
-            return found
+        def arrived():
+            events[:] = [e for e in self.events if e.name.endswith(f': {name}')]
+            return events
 
-        self.ros.spin_until(heard, name, 60.0)
-        return values_of(found[-1])
+        self.ros.spin_until(arrived, name, 60.0)
+        return values_of(events[-1])
 
     def lands_as_computed(self, period=PERIOD):
-        """Wait for the landing: all odom and it are the core's, no stamp is missing or uneven."""
+        """Wait for the landing: it and all odom are as computed, no stamp is missing or uneven."""
         landed, thrown = self.event('landed'), self.event('thrown')
         x, y, _ = EXPECTED.position
         assert float(landed['flight_time_s']) == EXPECTED.time
@@ -144,25 +145,25 @@ class Flight:
         self.ros.spin_until(lambda: ns(self.odom[-1]) >= at[-1], 'the last odom')
         stamps = [ns(message) for message in self.odom]
         assert {b - a for a, b in pairwise(stamps)} <= {period, 0}  # 0: shown again at a throw
-        told = {
+        published = {
             stamp: np.frombuffer(message, '<f8', NUMBERS, len(message) - 8 * NUMBERS)
             for stamp, message in zip(stamps, self.odom, strict=True)
         }
-        assert_array_equal([told[stamp][STATE] for stamp in at], expected)
+        assert_array_equal([published[stamp][STATE] for stamp in at], expected)
 
 
 @pytest.fixture
 def start(ros):
-    """A function that starts a simulator and what listens to it."""
+    """A function that starts a simulator and subscribes to it."""
 
-    def started(**more):
+    def start_flight(**more):
         return Flight(ros, ros.start(HIGH | more))
 
-    return started
+    return start_flight
 
 
 def memory(pid: int) -> float:
-    """Resident set of a process [MiB]."""
+    """Return the resident set of a process [MiB]."""
     pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
     return pages * mmap.PAGESIZE / 2**20
 
@@ -178,53 +179,53 @@ def record(tmp_path, request):
     def recording(flight):
         recorder = Recorder(flight.ros, tmp_path / 'bag', {})
         request.addfinalizer(recorder.process.kill)
-        recorder.listens_to('/odom', '/flight_events', '/configuration', '/release')
-        begun = len(flight.odom)
+        recorder.wait_for_topics('/odom', '/flight_events', '/configuration', '/release')
+        before = len(flight.odom)
         flight.throw()
 
-        def has_it_all():
-            """End the recorder: all odom is in the bag, and the flight can be flown from it."""
+        def assert_complete():
+            """End the recorder: all odom is in the bag, and the flight is verified from it."""
             last, bag = flight.odom[-1], []
 
-            def there():
+            def has_last():
                 bag[:] = [message.data for message in open_bag(recorder.bag).raw(['/odom'])]
                 return last in bag
 
-            flight.ros.spin_until(there, 'the last odom in the bag')
+            flight.ros.spin_until(has_last, 'the last odom in the bag')
             assert recorder.end() == 0
             assert open_bag(recorder.bag).complete
-            assert set(bag) >= set(flight.odom[begun : flight.odom.index(last)])
+            assert set(bag) >= set(flight.odom[before : flight.odom.index(last)])
             assert analyse_bag.main([str(recorder.bag), '--verify']) == 0
 
-        return recorder, has_it_all
+        return recorder, assert_complete
 
     return recording
 
 
-def test_stopped_processes_go_on_exactly_and_tell_how_long_they_stood(start, record, capsys):
+def test_stopped_processes_go_on_exactly_and_report_the_slip(start, record, capsys):
     flight = start()
-    recorder, has_it_all = record(flight)
+    recorder, assert_complete = record(flight)
     before, slipped = flight.behind()
     process = flight.sim.process
     for stopped in (0.05, 0.5):
         process.send_signal(signal.SIGSTOP)
         time.sleep(stopped)
         process.send_signal(signal.SIGCONT)
-        status, values = flight.tells()
-        while float(values['worst_lateness_s']) < 0.8 * stopped:  # it may have been on its way
-            status, values = flight.tells()
+        status, values = flight.next_diagnostics()
+        while float(values['worst_lateness_s']) < 0.8 * stopped:  # the first may be from before
+            status, values = flight.next_diagnostics()
         assert status.level == DiagnosticStatus.WARN
         assert 'ms late' in status.message
-    offset, told = flight.behind()
+    offset, reported = flight.behind()
     assert offset - before > 0.3  # of 0.5 s, all but 0.1 s are given up
-    # What the messages show is what the diagnostics tell; the quickest takes less than 50 ms.
-    assert told - slipped == pytest.approx(offset - before, abs=0.05)
+    # The stamps show what the diagnostics report; the fastest message takes less than 50 ms.
+    assert reported - slipped == pytest.approx(offset - before, abs=0.05)
     assert 'does not make up for it' in flight.sim.stderr
     recorder.process.send_signal(signal.SIGSTOP)
     time.sleep(0.5)
     recorder.process.send_signal(signal.SIGCONT)
     flight.lands_as_computed()
-    has_it_all()
+    assert_complete()
     assert 'identical to the last bit' in capsys.readouterr().out
 
 
@@ -252,7 +253,7 @@ def wall_clock(tmp_path, monkeypatch):
 
     shifted(HOUR)
     wall, steady = read_there()
-    assert wall == pytest.approx(HOUR, abs=30.0)  # the shim is at work, on this clock alone
+    assert wall == pytest.approx(HOUR, abs=30.0)  # the shim shifts this clock alone
     assert steady == pytest.approx(0.0, abs=30.0)
     shifted(0)
     return shifted
@@ -262,15 +263,15 @@ def test_the_wall_clock_may_be_set_while_it_flies_and_is_recorded(
     start, wall_clock, record, capsys
 ):
     flight = start()
-    recorder, has_it_all = record(flight)
+    recorder, assert_complete = record(flight)
     for seconds in (HOUR, -HOUR, 0):
         flight.goes_on(0.4)
         wall_clock(seconds)
-        flight.tells()  # once a second by the steady clock, whatever time it is
-        flight.tells()
+        flight.next_diagnostics()  # once a second by the steady clock
+        flight.next_diagnostics()
     flight.lands_as_computed()
-    recorder.wait_for('the wall clock was set by +3600.0 s; log times go on')
-    has_it_all()
+    recorder.wait_for_log('the wall clock was set by +3600.0 s; log times go on')
+    assert_complete()
     assert 'identical to the last bit' in capsys.readouterr().out
 
 
@@ -304,17 +305,17 @@ def test_subscribers_that_never_read_cost_neither_flight_nor_memory(start, reque
     flight.goes_on(1.5)
     before = memory(pid)
     flight.goes_on(3.0)
-    # 3,000 messages of 0.7 and 0.1 kB are 2.5 MB, which a history for the sleepers would hold.
+    # A history for the sleepers would hold 3,000 messages of 0.7 and 0.1 kB, 2.5 MB.
     assert memory(pid) - before < 1.0
     flight.lands_as_computed(1_000_000)
 
 
-def test_peers_that_come_and_go_and_parameters_set_all_the_time_change_nothing(ros, start):
+def test_peers_that_come_and_go_and_changed_parameters_do_not_affect_the_flight(ros, start):
     flight = start()
     pid = flight.sim.process.pid
 
     def visit():
-        """Four participants at a time: each listens and may throw."""
+        """Let four participants come and go: each subscribes and may throw."""
         contexts = [Context() for _ in range(4)]
         for context in contexts:
             context.init(args=[])
@@ -341,7 +342,7 @@ def test_peers_that_come_and_go_and_parameters_set_all_the_time_change_nothing(r
         assert not refused.successful
         assert 'publish_rate' in refused.reason
     flight.lands_as_computed()
-    ros.spin_until(lambda: open_files(pid) <= before, 'sockets of those who left to be closed')
+    ros.spin_until(lambda: open_files(pid) <= before, 'closed sockets')
     assert ros.call(flight.sim, 'throw').success
     ros.spin_until(lambda: flight.events[-1].name.endswith(': thrown'), 'the next throw')
     assert float(flight.event('thrown')['speed_m_s']) == pytest.approx(24.0)

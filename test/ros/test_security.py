@@ -23,7 +23,6 @@ ENCLAVE_FILES = (
     'cert.pem', 'governance.p7s', 'identity_ca.cert.pem', 'key.pem', 'permissions.p7s',
     'permissions_ca.cert.pem',
 )  # fmt: skip
-RECORDER = 'import sys; from disc_sim_ros.cli.recorder_node import main; sys.exit(main())'
 
 
 def opened(node, name):
@@ -62,12 +61,16 @@ def test_the_recorder_opens_what_its_policy_allows(ros, tmp_path):
     policy = read_policy('recorder_node')
     ros.start({'auto_throw': False})
     process = subprocess.Popen(
-        [sys.executable, '-c', RECORDER, '--ros-args', '-p', f'bag:={tmp_path / "bag"}'],
+        [
+            *(sys.executable, '-m', 'disc_sim_ros.ros.recorder'),
+            *('--ros-args', '-p', f'bag:={tmp_path / "bag"}'),
+        ],
         stderr=subprocess.DEVNULL,
     )
     try:
         ros.spin_until(
-            lambda: 'rt/odom' in opened(ros.node, 'recorder_node')[1], 'the recorder to hear odom'
+            lambda: 'rt/odom' in opened(ros.node, 'recorder_node')[1],
+            'a subscription to odom',
         )
         publish, subscribe = opened(ros.node, 'recorder_node')
     finally:
@@ -106,7 +109,7 @@ def test_a_node_does_not_start_unprotected_where_security_is_on(
     name = '/disc_sim/sim_node' if enclave == 'there' else '/disc_sim/stranger'
     begin = time.monotonic()
     done = subprocess.run(
-        [sys.executable, '-m', 'disc_sim_ros.ros.sim.node', '--ros-args', '--enclave', name],
+        [sys.executable, '-m', 'disc_sim_ros.ros.sim', '--ros-args', '--enclave', name],
         env=environment, capture_output=True, text=True, check=False, timeout=DEADLINE,
     )  # fmt: skip
     assert done.returncode == 2, (done, time.monotonic() - begin)
@@ -115,14 +118,3 @@ def test_a_node_does_not_start_unprotected_where_security_is_on(
     expected = "doesn't have the security libraries" if enclave == 'there' else 'SECURITY ERROR'
     assert last.startswith('sim_node: error: ')
     assert expected in last
-
-
-def test_a_demo_keeps_to_this_machine_and_to_a_domain_of_its_own(monkeypatch):
-    from disc_sim_ros.ros.processes import own_domain
-
-    monkeypatch.setenv('ROS_DOMAIN_ID', '0')
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
-    with own_domain() as first, own_domain() as second:
-        assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
-        assert os.environ['ROS_DOMAIN_ID'] == str(second)
-        assert 0 < first != second > 0

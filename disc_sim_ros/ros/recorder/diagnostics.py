@@ -1,4 +1,4 @@
-"""What recorder_node says of its work: losses, diagnostics, its last line."""
+"""What recorder_node reports: losses, its diagnostic status, its last line."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,19 +10,19 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
 
-LITTLE_ROOM = 1024**3  # bytes left on the disk that are worth a warning
+LITTLE_SPACE = 1024**3  # bytes free on the disk, below which there is a warning
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """How recording goes, beside what the bag itself tells.
+    """The state of a recording, beside that of the bag.
 
     Attributes:
-        paused: Nothing is recorded.
-        topics: That are subscribed to.
+        paused: Whether messages are not recorded.
+        topics: Number of topics subscribed to.
         backlog: Bytes that wait for the disk.
         lateness: Longest time that a message waited to be taken [s].
-        losses: Of `losses`.
+        losses: Numbers of lost messages, of `losses`.
     """
 
     paused: bool
@@ -32,25 +32,31 @@ class Progress:
     losses: Mapping[str, int]
 
 
-def losses(tracks: Iterable[TopicRecorder]) -> dict[str, int]:
-    """Return how many messages of which topic were lost how; nothing where none was."""
+def losses(recorders: Iterable[TopicRecorder]) -> dict[str, int]:
+    """Return the numbers of lost messages by the kind of loss and the topic, if not 0."""
     return {
-        f'{what} {track.name}': count
-        for track in tracks
-        for what, count in (
-            ('dropped', track.dropped),
-            ('lost', track.lost),
-            ('gaps', track.missed),
+        f'{kind} {recorder.name}': count
+        for recorder in recorders
+        for kind, count in (
+            ('dropped', recorder.dropped),
+            ('lost', recorder.lost),
+            ('gaps', recorder.missing),
         )
         if count
     }
 
 
 def diagnostic(name: str, writer: BagWriter, progress: Progress) -> DiagnosticStatus:
-    """Return the status of a recorder with this full name."""
+    """Return the diagnostic status of a recorder.
+
+    Args:
+        name: Full name of the node.
+        writer: The bag.
+        progress: The state of the recording.
+    """
     free = _free(writer.folder)
-    problems = [f'{what}: {count}' for what, count in progress.losses.items()]
-    if free < LITTLE_ROOM:
+    problems = [f'{loss}: {count}' for loss, count in progress.losses.items()]
+    if free < LITTLE_SPACE:
         problems.append(f'{free / 1e6:.0f} MB left on the disk')
     values: dict[str, object] = {
         'bag': writer.folder,
@@ -72,29 +78,33 @@ def diagnostic(name: str, writer: BagWriter, progress: Progress) -> DiagnosticSt
     )
 
 
-def summary(writer: BagWriter, found: Mapping[str, int]) -> str:
-    """Return the last line: what is in a closed bag, and how to open it."""
+def summary(writer: BagWriter, losses: Mapping[str, int]) -> str:
+    """Return the last line of a recorder: what its closed bag holds, and how to open it."""
     filled = sum(count > 0 for count in writer.counts.values())
-    lost = ', '.join(f'{key}: {count}' for key, count in found.items())
+    lost = ', '.join(f'{loss}: {count}' for loss, count in losses.items())
     return (
-        f'recorded {_several(writer.message_count, "message")} of {_several(filled, "topic")}, '
+        f'recorded {_plural(writer.message_count, "message")} of {_plural(filled, "topic")}, '
         f'{writer.bytes / 1e6:.1f} MB, {lost or "nothing lost"}, in {writer.folder} '
         '(open it with analyse_bag, Foxglove or ros2 bag play)'
     )
 
 
-def doubled(nodes: Sequence[tuple[str, str]]) -> set[str]:
-    """Return the full names that several nodes have, of their names and namespaces."""
+def duplicate_names(nodes: Sequence[tuple[str, str]]) -> set[str]:
+    """Return the full names that several nodes have.
+
+    Args:
+        nodes: Name and namespace of each node of the graph.
+    """
     names = [f'{namespace.rstrip("/")}/{name}' for name, namespace in nodes]
     return {name for name in names if names.count(name) > 1}
 
 
-def _several(count: int, what: str) -> str:
-    return f'{count} {what}' if count == 1 else f'{count} {what}s'
+def _plural(count: int, noun: str) -> str:
+    return f'{count} {noun}' if count == 1 else f'{count} {noun}s'
 
 
 def _free(folder: Path) -> int:
-    """Return the bytes free where a folder is; 0 where it is gone."""
+    """Return the bytes free on the disk of a folder; 0 if the folder is gone."""
     try:
         return shutil.disk_usage(folder).free
     except OSError:

@@ -1,98 +1,90 @@
-"""The topics of the graph: found, subscribed to, followed; and the thread that takes messages."""
+"""The topics of the graph: discovered, subscribed to, and kept up to date in the bag."""
 
-from collections.abc import Callable
-import threading
-import time
-
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from disc_sim_ros.bags.topic import Topic
-from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.ros.internals import Polled
-from disc_sim_ros.ros.recorder import qos
-from disc_sim_ros.ros.recorder.clock import LogClock
+from disc_sim_ros.ros.recorder.delivery import Delivery
 from disc_sim_ros.ros.recorder.options import Selection
-from disc_sim_ros.ros.recorder.topic_recorder import Deliver, TopicRecorder
-from disc_sim_ros.ros.recorder.writer_thread import BagThread
-
-TURN = 0.0005  # s for other threads where there is more to take than one round takes
+from disc_sim_ros.ros.recorder.qos import adapt_request_to_offers, bag_topic
+from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
+from disc_sim_ros.ros.recorder.writer_thread import WriterThread
 
 
 class TopicDiscovery:
-    """Records what is selected of the topics of the graph.
+    """Records the selected topics of the graph.
 
     Attributes:
-        lock: Held while messages are delivered and while it changes who hears them.
-        tracks: What is recorded, by name; changed by `look` alone.
-        clock: By which messages arrive.
+        recorders: The recorded topics by name; only `update` changes it.
     """
 
     def __init__(
-        self, node: Node, selection: Selection, thread: BagThread, deliver: Deliver
+        self, node: Node, selection: Selection, thread: WriterThread, delivery: Delivery
     ) -> None:
-        """Find nothing yet; `look` does."""
-        self.lock = threading.RLock()
-        self.tracks: dict[str, TopicRecorder] = {}
-        self.clock = LogClock()
+        """Prepare; `update` discovers topics.
+
+        Args:
+            node: The node that subscribes.
+            selection: Which topics to record.
+            thread: The thread that writes the bag.
+            delivery: What becomes of the messages; its lock is held meanwhile.
+        """
+        self.recorders: dict[str, TopicRecorder] = {}
         self._node = node
         self._log = node.get_logger()
         self._selection = selection
         self._thread = thread
-        self._deliver = deliver
-        self._group = Polled()
+        self._delivery = delivery
         self._graph: list[tuple[str, list[str]]] = []
         self._warned: set[str] = set()
         self._refused: set[str] = set()
 
-    def look(self) -> None:
-        """Subscribe to topics that are new, and follow changes of those that are not."""
-        with self.lock:
+    def update(self) -> None:
+        """Subscribe to topics that are new, and follow changes of the others."""
+        with self._delivery.lock:
             graph = self._node.get_topic_names_and_types()
             new: list[str] = []
             if graph != self._graph:
-                settled = [self._find(name, types, new) for name, types in graph]
-                self._graph = graph if all(settled) else []  # else look again
+                settled = [self._consider(name, types, new) for name, types in graph]
+                self._graph = graph if all(settled) else []  # otherwise consider all again
             if new:
                 self._log.info(f'recording {", ".join(new)}')
-            for track in self.tracks.values():
-                track.tidy()
-                if track.stale or self._node.count_publishers(track.name) != track.known:
-                    self._follow(track)
+            for recorder in self.recorders.values():
+                recorder.update()
+                if recorder.is_outdated(self._node.count_publishers(recorder.name)):
+                    self._follow(recorder)
 
     def take(self) -> bool:
-        """Take messages that have come; say whether there are more."""
-        with self.lock:
+        """Take messages that have arrived; return True if more wait."""
+        with self._delivery.lock:
             more = False
-            for track in self.tracks.values():
-                more = track.take() or more
+            for recorder in self.recorders.values():
+                more = recorder.take() or more
             return more
 
     def drain(self) -> None:
-        """Take all messages that have come."""
-        with self.lock:
-            for track in self.tracks.values():
-                track.drain()
+        """Take all messages that have arrived."""
+        with self._delivery.lock:
+            for recorder in self.recorders.values():
+                recorder.drain()
 
     def close(self) -> None:
-        """Hear no more."""
-        with self.lock:
-            for track in self.tracks.values():
-                track.close()
+        """Unsubscribe from all topics."""
+        with self._delivery.lock:
+            for recorder in self.recorders.values():
+                recorder.close()
 
     def warn_once(self, text: str, about: str = '') -> None:
-        """Log a warning, once for what it is about."""
+        """Log a warning, once for each `about`."""
         if (about or text) not in self._warned:
             self._warned.add(about or text)
             self._log.warning(text)
 
-    def _find(self, name: str, types: list[str], new: list[str]) -> bool:
-        """Record a topic if it is to be; return whether that is settled."""
-        if name in self.tracks:
+    def _consider(self, name: str, types: list[str], new: list[str]) -> bool:
+        """Record a topic if it is selected; return False to consider it again later."""
+        if name in self.recorders:
             if len(types) > 1:
-                used = self.tracks[name].type_name
+                used = self.recorders[name].type_name
                 text = f'{name} has several types, {", ".join(types)}: recorded is {used}'
                 self.warn_once(text, about=f'types of {name}')
             return True
@@ -102,29 +94,33 @@ class TopicDiscovery:
         others = [p for p in publishers if not self._is_own(p)]
         if not others and (self._selection.everything or not publishers):
             return False
-        if self._begin(name, (others or publishers)[0].topic_type, publishers):
+        if self._record(name, (others or publishers)[0].topic_type, publishers):
             new.append(name)
-        return len(types) == 1  # else look again, and warn
+        return len(types) == 1  # otherwise consider it again, and warn
 
-    def _begin(self, name: str, type_name: str, publishers: list[TopicEndpointInfo]) -> bool:
-        """Subscribe to a topic; return whether that is possible."""
+    def _record(self, name: str, type_name: str, publishers: list[TopicEndpointInfo]) -> bool:
+        """Begin to record a topic; return False if that is impossible."""
         try:
-            track = TopicRecorder(
-                self._node, name, type_name, self._group, self._deliver, clock=self.clock
+            recorder = TopicRecorder(
+                self._node,
+                name,
+                type_name,
+                self._delivery.deliver,
+                clock=self._delivery.clock,
             )
-            self._listen(track, publishers)
+            self._subscribe(recorder, publishers)
         except ImportError as error:
             self._refuse(name, f'no type {type_name} here ({error})')
             return False
-        except RCLError:  # its text is about ROS's own parts
+        except RuntimeError:  # rclpy's, whose text is about parts of ROS
             self._refuse(name, f'ROS refuses to subscribe to it as {type_name}')
             return False
-        topic = qos.topic_of(name, type_name, publishers)
-        if not topic.definition:
+        description = bag_topic(name, type_name, publishers)
+        if not description.definition:
             self.warn_once(f'{name}: no definition of {type_name} here, so that few can read it')
-        track.topic_id = self._number(topic)
-        track.known = len(publishers)
-        self.tracks[name] = track
+        self._thread.add_topic(recorder.topic, description)
+        recorder.set_described(len(publishers))
+        self.recorders[name] = recorder
         return True
 
     def _refuse(self, name: str, why: str) -> None:
@@ -135,54 +131,18 @@ class TopicDiscovery:
         own = self._node.get_name(), self._node.get_namespace()
         return (publisher.node_name, publisher.node_namespace) == own
 
-    def _listen(self, track: TopicRecorder, publishers: list[TopicEndpointInfo]) -> None:
-        profiles = [p.qos_profile for p in publishers if p.topic_type == track.type_name]
-        latched = any(q.durability == DurabilityPolicy.TRANSIENT_LOCAL for q in profiles)
-        track.listen(qos.adapt_request_to_offers(profiles), repeating=latched)
+    def _subscribe(self, recorder: TopicRecorder, publishers: list[TopicEndpointInfo]) -> None:
+        offers = [p.qos_profile for p in publishers if p.topic_type == recorder.type_name]
+        repeats = any(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
+        recorder.subscribe(adapt_request_to_offers(offers), repeats=repeats)
 
-    def _number(self, topic: Topic) -> int:
-        """Return the id that a topic will have in the bag."""
-        self._thread.call(lambda writer: writer.add(topic))
-        return len(self.tracks) + 1
-
-    def _follow(self, track: TopicRecorder) -> None:
-        """Tell the bag of the publishers of today, and hear them all."""
-        track.stale = False
-        publishers = self._node.get_publishers_info_by_topic(track.name)
-        track.known = len(publishers)  # the graph may learn later than the subscription
-        publishers = [p for p in publishers if p.topic_type == track.type_name]
+    def _follow(self, recorder: TopicRecorder) -> None:
+        """Describe the present publishers in the bag, and request what all of them offer."""
+        publishers = self._node.get_publishers_info_by_topic(recorder.name)
+        recorder.set_described(len(publishers))
+        publishers = [p for p in publishers if p.topic_type == recorder.type_name]
         if not publishers:
             return
-        topic = qos.topic_of(track.name, track.type_name, publishers)
-        self._thread.call(lambda writer: writer.update(track.topic_id, topic))
-        self._listen(track, publishers)
-
-
-class TakingThread(threading.Thread):
-    """Takes messages again and again.
-
-    Attributes:
-        failure: Why it has ended early; None as long as all is well.
-    """
-
-    def __init__(self, take: Callable[[], bool], period: float) -> None:
-        """Call `take`, and rest for a period [s] where it says that there is no more."""
-        super().__init__(name='listener')
-        self.failure: DiscSimError | None = None
-        self._take = take
-        self._period = period
-        self._ending = False
-
-    def run(self) -> None:
-        """Take until asked to end."""
-        try:
-            while not self._ending:
-                time.sleep(TURN if self._take() else self._period)
-        except Exception as error:  # whatever it is, the bag is closed and somebody told
-            self.failure = DiscSimError(f'cannot listen ({type(error).__name__}: {error})')
-
-    def end(self) -> None:
-        """End, and wait for it."""
-        self._ending = True
-        if self.is_alive():
-            self.join()
+        description = bag_topic(recorder.name, recorder.type_name, publishers)
+        self._thread.update_topic(recorder.topic, description)
+        self._subscribe(recorder, publishers)

@@ -1,22 +1,22 @@
-"""Quality of service: what publishers offer, what a recorder asks for, what its bag keeps."""
+"""Quality of service of a recorded topic: what the recorder requests, what the bag describes."""
 
 from collections.abc import Sequence
 
-from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.topic import INFINITE, Qos, Topic
+from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.ros.qos import bag_qos
 
 DEPTH = 5_000  # messages that wait for the recorder; Fast DDS holds no more for a reader
 
 
 def adapt_request_to_offers(offers: Sequence[QoSProfile]) -> QoSProfile:
-    """Return what to ask for so that every publisher is heard, as well as can be.
+    """Return the strictest request that every offer meets, as rosbag2 adapts it.
 
-    Reliable where all are, and messages of before where all keep some, as rosbag2 does: a request
-    that one offer does not meet would leave that publisher out.
+    It is reliable if all offers are, and transient local if all are: an offer that is less than
+    the request would leave its publisher out.
     """
     reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
     latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
@@ -28,14 +28,14 @@ def adapt_request_to_offers(offers: Sequence[QoSProfile]) -> QoSProfile:
     )
 
 
-def same(one: QoSProfile, other: QoSProfile) -> bool:
-    """Say whether two requests are heard by the same publishers."""
+def same_request(one: QoSProfile, other: QoSProfile) -> bool:
+    """Return True if the same publishers meet two requests."""
     policies = (one.reliability, one.durability)
     return policies == (other.reliability, other.durability)
 
 
-def topic_of(name: str, type_name: str, publishers: Sequence[TopicEndpointInfo]) -> Topic:
-    """Return what the bag says of a topic with these publishers, as far as they have its type."""
+def bag_topic(name: str, type_name: str, publishers: Sequence[TopicEndpointInfo]) -> Topic:
+    """Return a topic as the bag describes it, with the publishers that have its type."""
     publishers = [p for p in publishers if p.topic_type == type_name]
     hashes = [str(p.topic_type_hash) for p in publishers]
     return Topic(
@@ -43,24 +43,5 @@ def topic_of(name: str, type_name: str, publishers: Sequence[TopicEndpointInfo])
         type=type_name,
         definition=schemas.definition(type_name) or '',
         type_hash=hashes[0] if hashes else schemas.type_hash(type_name) or '',
-        qos=tuple(kept(p.qos_profile) for p in publishers),
+        qos=tuple(bag_qos(p.qos_profile) for p in publishers),
     )
-
-
-def kept(offer: QoSProfile) -> Qos:
-    """Return an offered profile as a bag keeps it."""
-    return Qos(
-        history=offer.history.name.lower(),
-        depth=offer.depth,
-        reliability=offer.reliability.name.lower(),
-        durability=offer.durability.name.lower(),
-        deadline=_nanoseconds(offer.deadline),
-        lifespan=_nanoseconds(offer.lifespan),
-        liveliness=offer.liveliness.name.lower(),
-        liveliness_lease_duration=_nanoseconds(offer.liveliness_lease_duration),
-        avoid_ros_namespace_conventions=offer.avoid_ros_namespace_conventions,
-    )
-
-
-def _nanoseconds(duration: Duration) -> int:
-    return min(int(duration.nanoseconds), INFINITE)

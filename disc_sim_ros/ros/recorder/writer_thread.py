@@ -1,4 +1,4 @@
-"""The thread that writes a bag: messages go in, the disk is its business."""
+"""The thread that writes a bag: other threads hand messages over and never wait for the disk."""
 
 from collections import deque
 from collections.abc import Callable
@@ -6,53 +6,88 @@ from concurrent.futures import Future
 import threading
 from typing import Any
 
+from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import BagError
 
 LARGEST_BACKLOG = 512 * 1024 * 1024  # bytes that wait for the disk; more are dropped
-_OVERHEAD = 200  # bytes of memory that a waiting message takes beside its data
+OVERHEAD = 200  # bytes of memory that a waiting message takes beside its data
 
-_Message = tuple[int, bytes, int, int]  # topic id, data, log time, publish time [ns]
+
+class BagTopic:
+    """A topic of the bag, which messages can name before the thread has added it.
+
+    Attributes:
+        id: Its id in the bag; the writing thread sets it before it writes a message of the topic.
+    """
+
+    __slots__ = ('id',)
+
+    def __init__(self) -> None:
+        self.id = 0
+
+
+_Message = tuple[BagTopic, bytes, int, int]  # data, log time, publish time [ns]
 _Job = tuple[Callable[[BagWriter], Any], Future[Any]]
 
 
-class BagThread(threading.Thread):
-    """Writes into a bag what other threads hand over, in the order in which it came.
+class WriterThread(threading.Thread):
+    """Writes to a bag what other threads hand over, in the order of arrival.
 
     Attributes:
-        failure: Why the bag has ended early; None as long as all is well.
+        failure: Why the bag was closed early; None otherwise.
     """
 
     def __init__(self, writer: BagWriter, flush_period: float) -> None:
-        """Take a bag, which this thread closes, and the longest time between flushes [s]."""
-        super().__init__(name='bag')
+        """Take over a bag, which this thread closes.
+
+        Args:
+            writer: The bag.
+            flush_period: Longest time between two flushes [s].
+        """
+        super().__init__(name='bag writer')
         self.failure: BagError | None = None
         self._writer = writer
         self._period = flush_period
         self._queue: deque[_Message | _Job] = deque()
         self._wake = threading.Event()
         self._ending = False
-        self._taken = 0  # bytes that came, by the other threads
-        self._written = 0  # bytes that went, by this thread
+        self._accepted = 0  # bytes of memory, counted by the other threads
+        self._written = 0  # bytes of memory, counted by this thread
 
     @property
     def backlog(self) -> int:
-        """Bytes of memory that wait for the disk."""
-        return self._taken - self._written
+        """Return the bytes of memory that wait for the disk."""
+        return self._accepted - self._written
 
-    def put(self, topic_id: int, data: bytes, log_time: int, publish_time: int) -> bool:
-        """Hand over a message; return whether it was taken: not where too much waits already."""
-        size = len(data) + _OVERHEAD
-        if self._taken + size - self._written > LARGEST_BACKLOG or self.failure is not None:
+    def put(self, topic: BagTopic, data: bytes, log_time: int, publish_time: int) -> bool:
+        """Hand over a message with its times [ns]; return False if it is dropped.
+
+        A message is dropped if too much waits already, or if the thread has failed.
+        """
+        size = len(data) + OVERHEAD
+        if self._accepted + size - self._written > LARGEST_BACKLOG or self.failure is not None:
             return False
-        self._taken += size
-        self._queue.append((topic_id, data, log_time, publish_time))
+        self._accepted += size
+        self._queue.append((topic, data, log_time, publish_time))
         if not self._wake.is_set():
             self._wake.set()
         return True
 
+    def add_topic(self, topic: BagTopic, description: Topic) -> None:
+        """Add a topic to the bag, before the messages that are put from now on."""
+
+        def add(writer: BagWriter) -> None:
+            topic.id = writer.add(description)
+
+        self.call(add)
+
+    def update_topic(self, topic: BagTopic, description: Topic) -> None:
+        """Change the description of a topic that was added."""
+        self.call(lambda writer: writer.update(topic.id, description))
+
     def call(self, job: Callable[[BagWriter], Any]) -> Future[Any]:
-        """Have something done with the bag behind all that was put so far."""
+        """Call `job` with the bag, after all that was put so far; return its future result."""
         future: Future[Any] = Future()
         self._queue.append((job, future))
         self._wake.set()
@@ -79,12 +114,12 @@ class BagThread(threading.Thread):
         while True:
             self._wake.wait(self._period)
             self._wake.clear()
-            ending = self._ending  # before the look at the queue: what came until then is there
-            quiet = not self._queue
+            ending = self._ending  # read before the queue: what was put before `end` is written
+            idle = not self._queue
             self._write_queue()
             if ending:
                 return
-            if quiet:
+            if idle:
                 self._writer.flush()
 
     def _write_queue(self) -> None:
@@ -93,8 +128,9 @@ class BagThread(threading.Thread):
         while queue:
             item = queue.popleft()
             if len(item) == 4:
-                write(*item)
-                self._written += len(item[1]) + _OVERHEAD
+                topic, data, log_time, publish_time = item
+                write(topic.id, data, log_time, publish_time)
+                self._written += len(data) + OVERHEAD
             else:
                 job, future = item
                 try:

@@ -1,4 +1,4 @@
-"""Simulated time: whole steps from a first stamp, exact to the nanosecond for ever."""
+"""Simulated time: whole steps from a first stamp, exact to the nanosecond however long it runs."""
 
 from fractions import Fraction
 
@@ -6,24 +6,27 @@ NANOSECONDS = 1_000_000_000
 
 
 class SimClock:
-    """Counts steps and says what they are in nanoseconds.
+    """Counts steps and converts them to nanoseconds.
 
     Attributes:
-        steps: Steps since the last `restart`.
+        steps: Steps since the start or the last `restart`.
     """
 
     def __init__(self, start: int, rate: float) -> None:
-        """Begin at a stamp [ns] with a number of steps a second."""
+        """Start at a stamp.
+
+        Args:
+            start: The first stamp [ns].
+            rate: Steps per simulated second [Hz].
+        """
+        self.steps = 0
         self._start = start
-        self.restart(rate)
+        self._num, self._den = _period(rate)
 
     def restart(self, rate: float) -> None:
-        """Go on from the present stamp with another rate."""
-        if hasattr(self, 'steps'):
-            self._start = self.now
-        # 1000.0 Hz is 1000 Hz: rates that people write are fractions of small numbers.
-        period = NANOSECONDS / Fraction(rate).limit_denominator(1_000_000)
-        self._num, self._den = period.numerator, period.denominator
+        """Count steps anew from the present stamp, at another rate [Hz]."""
+        self._start = self.now
+        self._num, self._den = _period(rate)
         self.steps = 0
 
     @property
@@ -32,10 +35,17 @@ class SimClock:
         return self.at(self.steps)
 
     def at(self, step: int) -> int:
-        """Return the stamp of a step since the last `restart` [ns]."""
+        """Return the stamp of a step since the last `restart` [ns], rounded down."""
         return self._start + step * self._num // self._den
 
     def step_at(self, stamp: int) -> int:
-        """Return the first step not before a stamp [ns], or the present one."""
+        """Return the first step not before a stamp [ns], at least the present one."""
         step = -(-(stamp - self._start) * self._den // self._num)
         return max(step, self.steps)
+
+
+def _period(rate: float) -> tuple[int, int]:
+    """Return numerator and denominator of the period of a rate [Hz], in nanoseconds."""
+    # 1000.0 Hz is 1000 Hz: rates that people write are fractions of small numbers.
+    period = NANOSECONDS / Fraction(rate).limit_denominator(1_000_000)
+    return period.numerator, period.denominator

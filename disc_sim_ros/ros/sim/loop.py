@@ -1,4 +1,4 @@
-"""The simulation thread: pace by the steady clock, and requests of other threads."""
+"""The simulation thread: it keeps pace with the steady clock and serves other threads."""
 
 from collections import deque
 from collections.abc import Callable
@@ -12,41 +12,43 @@ from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import SimConfig
-from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.ros.sim.events import in_seconds
+from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.realtime import Pacer, configure_thread
-from disc_sim_ros.ros.sim.simulation import Counts, Simulation, in_seconds
+from disc_sim_ros.ros.sim.simulation import Counts, Simulation
 
 LONGEST_SLEEP = 0.01  # s
-LONGEST_WAIT = 0.5  # s of wall time for a request until a message is due
-LONGEST_QUANTUM = 1e-3  # s of simulated time between two looks at the command topics, at a pace
-FAST_QUANTUM = 0.02  # s of it as fast as possible, where that is no time at all
+LONGEST_WAIT = 0.5  # s of wall time that a request waits for the next message
+LONGEST_QUANTUM = 1e-3  # s of simulated time between two polls of the command topics, at a pace
+FAST_QUANTUM = 0.02  # s of simulated time, as fast as possible, where it takes almost no wall time
+_SLOWEST = 1e-9  # the pacer's real-time factor where there is no pace
 
 
 class SimLoop(threading.Thread):
-    """Flies the disc on a thread of its own, at `real_time_factor` times real time.
+    """Flies the disc on its own thread, at `real_time_factor` times real time.
 
     Everything happens between two steps: commands at any step; throws, resets and pauses where a
-    message is due. Other threads use `submit` and `end`, and read the attributes.
+    message is due. Other threads call `submit` and `end`, and read the attributes.
 
     Attributes:
         pacer: Lateness and slips.
-        paused: Whether time stands still.
+        paused: Whether simulated time stands still.
     """
 
     def __init__(
         self,
         config: SimConfig,
-        outputs: Outputs,
+        publishers: Publishers,
         commands: Commands,
         start: int,
         warn: Callable[..., None],
     ) -> None:
         """Prepare the thread; see `Simulation` for the arguments."""
         super().__init__(name='simulation')
-        self.pacer = Pacer(config.setup.step, max(config.real_time_factor, 1e-9), 0.0)
+        self.pacer = Pacer(config.setup.step, max(config.real_time_factor, _SLOWEST), 0.0)
         self.paused = False
-        self._simulation = Simulation(config, outputs, commands, start, warn)
-        self._outputs = outputs
+        self._simulation = Simulation(config, publishers, commands, start, warn)
+        self._publishers = publishers
         self._warn = warn
         self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._wake = threading.Event()
@@ -55,9 +57,9 @@ class SimLoop(threading.Thread):
     # ---- for other threads ----
 
     @property
-    def timeline(self) -> SimClock:
+    def clock(self) -> SimClock:
         """Return simulated time."""
-        return self._simulation.timeline
+        return self._simulation.clock
 
     @property
     def commands(self) -> Commands:
@@ -66,11 +68,11 @@ class SimLoop(threading.Thread):
 
     @property
     def counts(self) -> Counts:
-        """Return what has happened so far."""
+        """Return the numbers of events so far."""
         return self._simulation.counts
 
     def submit(self, action: Callable[[], str]) -> Future[str]:
-        """Have `action` called between two steps; return what will be its result."""
+        """Call `action` on the simulation thread, between two steps; return its future result."""
         future: Future[str] = Future()
         self._requests.append((action, future))
         self._wake.set()
@@ -84,49 +86,49 @@ class SimLoop(threading.Thread):
     # ---- actions for `submit` ----
 
     def throw(self) -> str:
-        """Let the disc go as configured; one in flight is taken out of the air."""
-        self._with_pace(self._simulation.throw)
+        """Release the disc as configured; this ends a flight that is in the air."""
+        self._keeping_pace(self._simulation.throw)
         if self.paused:
             self._simulation.publish()
         number = self._simulation.flight
-        return f'flight {number}, released at {in_seconds(self.timeline.now)} s'
+        return f'flight {number}, released at {in_seconds(self.clock.now)} s'
 
     def reset(self) -> str:
-        """Put the disc back to its launch, at rest; forget commands and the number of flights."""
-        self._with_pace(self._simulation.reset)
+        """Put the disc at its launch, at rest; discard commands and count flights from 1 again."""
+        self._keeping_pace(self._simulation.reset)
         if self.paused:
             self._simulation.publish()
-        return 'the disc is back at its launch, at rest; ~/throw lets it go'
+        return 'the disc is at its launch, at rest; ~/throw releases it'
 
     def pause(self) -> str:
-        """Let time stand still."""
+        """Stop simulated time."""
         self.paused = True
-        return f'time stands still at {in_seconds(self.timeline.now)} s'
+        return f'paused at {in_seconds(self.clock.now)} s'
 
     def resume(self) -> str:
-        """Let time go on."""
+        """Let simulated time go on."""
         self.paused = False
-        return 'time goes on'
+        return f'resumed at {in_seconds(self.clock.now)} s'
 
     def step(self) -> str:
-        """Go on to the next message while time stands still.
+        """Advance to the next message while paused.
 
         Raises:
-            ConfigError: Time does not stand still.
+            ConfigError: The simulation is not paused.
         """
         if not self.paused:
             raise ConfigError('~/step', 'a running simulation', 'pause it first by ~/pause')
         self._simulation.poll()
         self._advance(self._simulation.config.steps_per_publish, serve=False)
-        return f'now at {in_seconds(self.timeline.now)} s'
+        return f'stepped to {in_seconds(self.clock.now)} s'
 
     def configure(self, config: SimConfig) -> str:
         """Take changed parameters: wind and pace at once, the rest at the next throw."""
-        self._with_pace(lambda: self._simulation.configure(config))
+        self._keeping_pace(lambda: self._simulation.configure(config))
         return ''
 
-    def _with_pace(self, act: Callable[[], None]) -> None:
-        """Act, and count steps anew where that has changed their pace."""
+    def _keeping_pace(self, act: Callable[[], None]) -> None:
+        """Act, and restart the pacer if that has changed the pace."""
         before = self._simulation.config
         act()
         now = self._simulation.config
@@ -140,8 +142,8 @@ class SimLoop(threading.Thread):
         sim = self._simulation
         configure_thread(sim.config.realtime_priority, self._warn)
         sim.publish_wind()
-        sim.publish_look()
-        self._arrive(serve=True)
+        sim.publish_markers()
+        self._publish_step(serve=True)
         self._restart_pacer()
         while not self._ended.is_set():
             sim.poll()
@@ -150,27 +152,27 @@ class SimLoop(threading.Thread):
                 self._wake.clear()
                 self._serve()
                 self._restart_pacer()
-                self._outputs.tick(self.timeline.now)
-            elif self._requests and self._until_message() > LONGEST_WAIT:
-                self.timeline.restart(sim.config.physics_rate)  # which makes one due now
-                self._arrive(serve=True)
+                self._publishers.publish_clock(self.clock.now)
+            elif self._requests and self._time_to_message() > LONGEST_WAIT:
+                self.clock.restart(sim.config.physics_rate)  # then a message is due now
+                self._publish_step(serve=True)
             else:
-                self._advance(self._due(), serve=True)
+                self._advance(self._wait_for_steps(), serve=True)
 
     def _idle(self) -> bool:
-        """Say whether time need not go on: as fast as possible, and nothing is in the air."""
+        """Return True if time need not go on: as fast as possible, and no flight to show."""
         sim = self._simulation
         if sim.config.real_time_factor > 0.0 or not sim.at_message:
             return False  # on to the message that shows the disc where it landed
-        return not (sim.flying or sim.expecting)
+        return not (sim.flying or sim.awaiting_throw)
 
-    def _until_message(self) -> float:
+    def _time_to_message(self) -> float:
         """Return the wall time until the next message is due [s]."""
         if self._simulation.config.real_time_factor == 0.0:
             return 0.0
         return self.pacer.wait(time.monotonic(), self._simulation.steps_to_message)
 
-    def _due(self) -> int:
+    def _wait_for_steps(self) -> int:
         """Return how many steps are due, after sleeping until it is time for some."""
         config = self._simulation.config
         if config.real_time_factor == 0.0:
@@ -186,13 +188,13 @@ class SimLoop(threading.Thread):
         steps = self.pacer.due(time.monotonic())
         if self.pacer.slips > slips:
             self._warn(
-                f'the machine held the simulation up; it has fallen {self.pacer.slipped:.3f} s '
-                'behind the wall clock in all and does not make up for it'
+                'the machine stalled the simulation, which does not make up for it; it is '
+                f'{self.pacer.slipped:.3f} s behind the wall clock in all'
             )
         return steps
 
     def _quantum(self, longest: float) -> int:
-        """Return how many steps to make between two looks at the command topics."""
+        """Return how many steps to make between two polls of the command topics."""
         config = self._simulation.config
         return max(1, min(config.steps_per_publish, round(longest / config.setup.step)))
 
@@ -200,22 +202,22 @@ class SimLoop(threading.Thread):
         """Make steps, stopping at each where a command begins or ends or a message is due."""
         sim, restarts = self._simulation, self.pacer.restarts
         while steps > 0:
-            made = sim.leap(steps)
-            self.pacer.made(made)
-            steps -= made
+            done = sim.advance(steps)
+            self.pacer.count(done)
+            steps -= done
             if sim.at_message:
                 paused = self.paused
-                self._arrive(serve=serve)
+                self._publish_step(serve=serve)
                 if self.paused != paused or self.pacer.restarts != restarts:
                     return
             else:
-                self._outputs.tick(self.timeline.now, patience=qos.CLOCK_PERIOD)
+                self._publishers.publish_clock(self.clock.now, delay=qos.CLOCK_PERIOD)
 
-    def _arrive(self, *, serve: bool) -> None:
+    def _publish_step(self, *, serve: bool) -> None:
         """Do what happens where a message is due: requests, throws, then the messages."""
         if serve:
             self._serve()
-        self._with_pace(self._simulation.arrive)
+        self._keeping_pace(self._simulation.publish_step)
 
     def _serve(self) -> None:
         while self._requests:
@@ -229,7 +231,7 @@ class SimLoop(threading.Thread):
 
     def _restart_pacer(self) -> None:
         config = self._simulation.config
-        factor = max(config.real_time_factor, 1e-9)
+        factor = max(config.real_time_factor, _SLOWEST)
         self.pacer.restart(config.setup.step, factor, time.monotonic())
 
 

@@ -1,4 +1,4 @@
-"""What there is to look at: the disc in its true size, and a field with an enlarged disc."""
+"""The markers: the disc in its true size, and the field with an enlarged disc."""
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
@@ -28,16 +28,16 @@ _ORANGE = ColorRGBA(r=0.835, g=0.369, b=0.0, a=1.0)
 _GREY = ColorRGBA(r=0.62, g=0.66, b=0.64, a=1.0)
 
 
-_KEPT = 8  # throws from here and there; serialising takes a millisecond, which a throw has not
+_CACHED = 8  # releases; serialising takes a millisecond, too long for the step of a throw
 
 
-@lru_cache(_KEPT)
+@lru_cache(_CACHED)
 def disc_bytes(frame: str, diameter: float) -> bytes:
     """Return `disc_markers`, serialised."""
     return bytes(serialize_message(disc_markers(frame, diameter)))
 
 
-@lru_cache(_KEPT)
+@lru_cache(_CACHED)
 def field_bytes(frames: Frames, diameter: float, release: tuple[float, float, float]) -> bytes:
     """Return the `field_markers` of a flight that has not landed, serialised."""
     return bytes(serialize_message(field_markers(frames, diameter, release)))
@@ -47,8 +47,8 @@ def disc_markers(frame: str, diameter: float) -> MarkerArray:
     """Return the disc in its true size, see `_disc`.
 
     Args:
-        frame: The frame that turns with the plastic.
-        diameter: Of the disc [m].
+        frame: The frame that spins with the disc.
+        diameter: Diameter of the disc [m].
     """
     return MarkerArray(markers=[_disc(frame, diameter, 'disc')])
 
@@ -60,19 +60,19 @@ def field_markers(
     landing: Sequence[float] | None = None,
     result: str = '',
 ) -> MarkerArray:
-    """Return what makes a flight readable from afar: lines with distances, and a larger disc.
+    """Return the markers that show a flight from afar: lines with distances and a larger disc.
 
     Namespaces: 'disc_enlarged' in `disc_body`; 'lines', 'distances', 'release' and, once landed,
-    'landing' and 'result' in `map`. Without a landing those of the flight before are taken away.
+    'landing' and 'result' in `map`. Without a landing those of the last flight are deleted.
 
     Args:
         frames: Names of the frames.
-        diameter: Of the disc [m].
-        release: Where it was let go, x, y, z in `map` [m].
-        landing: Where it touched the ground, x, y, z in `map` [m]; None before.
-        result: What to write above the landing.
+        diameter: Diameter of the disc [m].
+        release: Position of the release, x, y, z in `map` [m].
+        landing: Position of the landing, x, y, z in `map` [m]; None before it.
+        result: Text above the landing.
     """
-    markers = [*_standing(frames, diameter), _spot(frames.map, release, 'release', _BLUE)]
+    markers = [*_constant_markers(frames, diameter), _spot(frames.map, release, 'release', _BLUE)]
     if landing is None:
         markers += [Marker(action=Marker.DELETE, ns=name) for name in ('landing', 'result')]
     else:
@@ -81,9 +81,9 @@ def field_markers(
     return MarkerArray(markers=markers)
 
 
-@lru_cache(_KEPT)
-def _standing(frames: Frames, diameter: float) -> tuple[Marker, ...]:
-    """Return what is the same in all flights of a disc."""
+@lru_cache(_CACHED)
+def _constant_markers(frames: Frames, diameter: float) -> tuple[Marker, ...]:
+    """Return the markers that are the same in all flights of a disc."""
     disc = _disc(frames.disc_body, ENLARGEMENT * diameter, 'disc_enlarged')
     return disc, _lines(frames.map), *_distances(frames.map)
 
@@ -100,7 +100,7 @@ def _disc(frame: str, diameter: float, namespace: str) -> Marker:
         top = [Point(x=0.0, y=0.0, z=h)]
         top += [Point(x=r * math.cos(t), y=r * math.sin(t), z=h) for t in (a, b)]
         low = [Point(x=p.x, y=p.y, z=-h) for p in top[1:]]
-        under = [top[0], top[2], top[1]]  # seen from below, which is hollow
+        under = [top[0], top[2], top[1]]  # visible from below, where the disc is hollow
         rim = [low[0], low[1], top[2], low[0], top[2], top[1]]
         for triangle in (top, under, rim):
             marker.points += triangle
@@ -131,7 +131,7 @@ def _distances(frame: str) -> Iterator[Marker]:
 
 
 def _text(frame: str, at: Sequence[float], text: str, namespace: str, above: float) -> Marker:
-    """Return a text that faces the viewer, above a place on the ground [m]."""
+    """Return a text that faces the viewer, at a height `above` [m] a place on the ground [m]."""
     marker = _marker(frame, Marker.TEXT_VIEW_FACING, namespace)
     marker.text = text
     marker.pose.position.x, marker.pose.position.y = float(at[0]), float(at[1])
@@ -151,9 +151,9 @@ def _spot(frame: str, at: Sequence[float], namespace: str, colour: ColorRGBA) ->
     return marker
 
 
-def _marker(frame: str, kind: int, namespace: str) -> Marker:
-    """Return a marker that keeps to its frame as that moves."""
-    marker = Marker(type=kind, action=Marker.ADD, ns=namespace, frame_locked=True)
+def _marker(frame: str, shape: int, namespace: str) -> Marker:
+    """Return a marker that moves with its frame."""
+    marker = Marker(type=shape, action=Marker.ADD, ns=namespace, frame_locked=True)
     marker.header.frame_id = frame
     marker.pose.orientation.w = 1.0
     return marker

@@ -10,21 +10,23 @@ import os
 
 CATCH_UP = 0.1  # s of wall time whose steps are made up for after a stall
 RECENT = 1000  # deadlines
+_PR_SET_TIMERSLACK = 29
 
 
 class Pacer:
-    """Counts steps against the steady clock; knows nothing of what a step is.
+    """Compares the steps that are done with the steady clock.
 
-    Deadlines are absolute, so that no lateness adds up. After a stall of more than `CATCH_UP` the
-    rest of it is given up: the simulation then runs behind the wall clock by that much.
+    Deadlines are absolute, so that lateness does not add up. After a stall of more than `CATCH_UP`
+    the pacer gives up the rest, which is called a slip: the simulation then runs behind the wall
+    clock by that much.
 
     Attributes:
         slipped: Wall time given up so far [s].
-        slips: How often.
-        missed: Deadlines met later than one step, so far.
-        restarts: How often `restart` was called.
-        recent: Lateness of the last deadlines [s].
-        worst: Greatest lateness since `take_worst` was last called [s].
+        slips: Number of slips so far.
+        missed: Number of deadlines met later than one step, so far.
+        restarts: Number of calls of `restart`.
+        recent: Lateness at the last deadlines [s].
+        worst: Greatest lateness since the last call of `take_worst` [s].
     """
 
     def __init__(self, step: float, rate: float, now: float) -> None:
@@ -45,7 +47,7 @@ class Pacer:
         self.restarts += 1
 
     def due(self, now: float) -> int:
-        """Return how many steps are due at `now`, after giving up what cannot be made up for."""
+        """Return how many steps are due at `now`, after slipping if the stall was too long."""
         late = now - self._epoch - (self._done + 1) * self._period
         if late < 0.0:
             return 0
@@ -60,12 +62,12 @@ class Pacer:
             self.slips += 1
         return math.floor((now - self._epoch) / self._period + 1e-9) - self._done
 
-    def made(self, steps: int) -> None:
-        """Count steps that were made."""
+    def count(self, steps: int) -> None:
+        """Count steps that are done."""
         self._done += steps
 
     def wait(self, now: float, steps: int) -> float:
-        """Return how long to sleep until `steps` more are due [s]."""
+        """Return how long to sleep until `steps` more are due [s]; negative if they are late."""
         return self._epoch + (self._done + steps) * self._period - now
 
     def take_worst(self) -> float:
@@ -79,20 +81,17 @@ class Pacer:
         return recent[min(int(share * len(recent)), len(recent) - 1)] if recent else 0.0
 
 
-_PR_SET_TIMERSLACK = 29
-
-
 def configure_thread(priority: int, warn: Callable[[str], None]) -> None:
-    """Have the calling thread woken as exactly as the machine permits.
+    """Make the calling thread wake up as exactly as the machine permits.
 
     Args:
-        priority: SCHED_FIFO priority from 1 to 99; 0 leaves the ordinary scheduling.
-        warn: Called with a line where the machine does not permit it.
+        priority: SCHED_FIFO priority from 1 to 99; 0 keeps the ordinary scheduling.
+        warn: Called with a line where the machine does not permit the priority.
     """
-    # Linux rounds sleeps of ordinary threads up by 50 us; another system sleeps as it can.
+    # Linux rounds sleeps of ordinary threads up by 50 us; other systems sleep as they can.
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    # A full collection stalls all threads for tens of milliseconds: it skips what is old by now.
+    # A full collection stalls all threads for tens of milliseconds: exempt all present objects.
     gc.collect()
     gc.freeze()
     if priority > 0:

@@ -1,9 +1,8 @@
-"""A disc on its timeline: throws, commands, wind, and what is published when. It keeps no pace."""
+"""A disc in simulated time: throws, commands, wind, and what is published when."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import math
-from typing import Any
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError, IntegrationError
@@ -13,11 +12,13 @@ from disc_sim_ros.physics.flight_config import configuration_text
 from disc_sim_ros.physics.kernels.equations import DISC_AIR, State, Velocity
 from disc_sim_ros.physics.simulator import NOTHING, FlightSimulator
 from disc_sim_ros.ros import messages
+from disc_sim_ros.ros.sim import events
 from disc_sim_ros.ros.sim.clock import NANOSECONDS, SimClock
-from disc_sim_ros.ros.sim.commands import ActiveControl, Commands, pop_due
+from disc_sim_ros.ros.sim.commands import ActiveControl, Commands, CommandTopic, pop_due
 from disc_sim_ros.ros.sim.config import SimConfig
+from disc_sim_ros.ros.sim.events import Event
 from disc_sim_ros.ros.sim.imu import ImuErrors
-from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.ros.sim.publishers import Publishers
 
 _NO_MOMENT = (0.0, 0.0, 0.0, DISC_AIR)
 _NO_COEFFICIENTS = (0.0, 0.0, 0.0)
@@ -26,7 +27,7 @@ _AT_ONCE = ('real_time_factor', 'command_timeout', 'throw_period', 'path_rate')
 
 @dataclass
 class Counts:
-    """What has happened so far, for /diagnostics."""
+    """Numbers of events so far, for /diagnostics."""
 
     throws: int = 0
     landings: int = 0
@@ -35,37 +36,41 @@ class Counts:
 
 
 class Simulation:
-    """Flies the disc from message to message; who calls it sets the pace.
+    """Flies the disc from message to message. It does not wait: the caller sets the pace.
 
     Attributes:
-        timeline: Simulated time.
+        clock: Simulated time.
         commands: The command topics.
-        counts: What has happened so far.
-        outputs: The topics that it publishes.
-        config: The parameters that count now; some of the newest wait for the next throw.
-        held: The control inputs that act now.
+        counts: Numbers of events so far.
+        publishers: The topics that it publishes.
+        config: The parameters in force; some of the newest wait for the next throw.
+        active: The control inputs that act at present.
         flight: Number of the last flight since the start or a reset, from 1.
     """
 
     def __init__(
         self,
         config: SimConfig,
-        outputs: Outputs,
+        publishers: Publishers,
         commands: Commands,
         start: int,
         warn: Callable[..., None],
     ) -> None:
         """Hold the disc at its launch.
 
-        `start` is the first stamp [ns]; `warn(text, about)` logs a line, now and then about the
-        same thing.
+        Args:
+            config: The parameters.
+            publishers: The topics to publish.
+            commands: The command topics to poll.
+            start: The first stamp [ns].
+            warn: `warn(text, about)` logs a line, throttled for each `about`.
         """
-        self.timeline = SimClock(start, config.physics_rate)
+        self.clock = SimClock(start, config.physics_rate)
         self.commands = commands
         self.counts = Counts()
-        self.outputs = outputs
+        self.publishers = publishers
         self.config = self._next_config = config
-        self.held = ActiveControl()
+        self.active = ActiveControl()
         self._warn = warn
         self._wind = config.setup.wind
         self._sim: FlightSimulator | None = None
@@ -75,53 +80,53 @@ class Simulation:
         self._released = start
         self._throw_at: float = start if config.auto_throw else math.inf
 
-    # ---- what it is doing ----
+    # ---- state ----
 
     @property
     def flying(self) -> bool:
-        """Say whether the disc is in the air."""
+        """Return True if the disc is in the air."""
         return self._sim is not None and not self._sim.landed
 
     @property
-    def expecting(self) -> bool:
-        """Say whether a throw is due some time."""
+    def awaiting_throw(self) -> bool:
+        """Return True if a throw is scheduled."""
         return self._throw_at < math.inf or bool(self.commands.throw.waiting)
 
     @property
     def steps_to_message(self) -> int:
-        """Return the steps to the next message, all of them where one is due now."""
+        """Return the steps to the next message: a whole period where one is due now."""
         every = self.config.steps_per_publish
-        return every - self.timeline.steps % every
+        return every - self.clock.steps % every
 
     @property
     def at_message(self) -> bool:
-        """Say whether a message is due at the present step."""
-        return self.timeline.steps % self.config.steps_per_publish == 0
+        """Return True if a message is due at the present step."""
+        return self.clock.steps % self.config.steps_per_publish == 0
 
     # ---- time ----
 
-    def leap(self, most: int) -> int:
-        """Make steps, up to where a command begins or ends or a message is due.
+    def advance(self, most: int) -> int:
+        """Make steps, up to the next command, expiry or message.
 
         Args:
             most: Steps to make at most, 1 or more.
 
         Returns:
-            The steps made.
+            The number of steps made.
         """
-        time = self.timeline
-        self._change()
-        change = min(self.commands.next_time(), self.held.next_time())
+        clock = self.clock
+        self._apply_changes()
+        change = min(self.commands.next_change(), self.active.next_expiry())
         n = min(most, self.steps_to_message)
         if change < math.inf:
-            n = min(n, max(time.step_at(int(change)) - time.steps, 1))
+            n = min(n, max(clock.step_at(int(change)) - clock.steps, 1))
         self._fly(n)
-        time.steps += n
+        clock.steps += n
         return n
 
-    def arrive(self) -> None:
-        """Do what happens where a message is due: throws, then the messages."""
-        now = self.timeline.now
+    def publish_step(self) -> None:
+        """Throw if it is time for that, then publish the state: where a message is due."""
+        now = self.clock.now
         release = pop_due(self.commands.throw, now)
         if release is not None:
             self.throw(release)
@@ -141,15 +146,15 @@ class Simulation:
             self._resting = at_rest(sim.state)
             self._sim = None
             self._warn(f'flight {self.flight} ended: {error}')
-            self._event('failed', str(error), {}, bad=True)
+            self._publish_event(events.failed(error))
             return
         if sim.landed and not was_landed:
-            self._tell_landing(sim)
+            self._publish_landing(sim)
 
     # ---- throws ----
 
     def throw(self, release: State | None = None) -> None:
-        """Let the disc go, from the configured launch or from a commanded state."""
+        """Release the disc, from the configured launch or from a commanded state."""
         self._take_config()
         config = self.config
         gusts = config.setup.wind
@@ -163,19 +168,17 @@ class Simulation:
         except ConfigError as error:
             if release is None:
                 raise
-            self.commands.throw.accepted -= 1
-            self.commands.throw.drop(str(error))
+            self.commands.throw.drop_accepted(str(error))
             self._warn(f'throw dropped: {error}', topics.THROW)
             return
-        sim.take(self.held.control)
+        sim.take(self.active.control)
         self._sim = sim
         self._imu_errors = ImuErrors(config.imu, self.flight)
         self.flight += 1
         self.counts.throws += 1
-        self._released = self.timeline.now
+        self._released = self.clock.now
         self._throw_at = self._after_period()
-        out = self.outputs
-        out.begin_path()
+        self.publishers.clear_path()
         text = configuration_text(
             setup,
             sim.release,
@@ -185,32 +188,26 @@ class Simulation:
             ground=config.ground,
             command_timeout=config.command_timeout,
         )
-        out.released(self._released, sim.state, text, setup.disc.diameter)
+        self.publishers.publish_release(self._released, sim.state, text, setup.disc.diameter)
         self.publish_wind()
-        self._publish_held()
-        speed = math.hypot(*sim.state[3:6])
-        values = {
-            'flight': self.flight,
-            'from': 'launch' if release is None else topics.THROW,
-            'speed_m_s': speed,
-            'spin_rad_s': sim.state.r,
-        }
-        self._event('thrown', f'{speed:.2f} m/s, spin {sim.state.r:.2f} rad/s', values)
+        self._publish_active_control()
+        source = 'launch' if release is None else topics.THROW
+        self._publish_event(events.thrown(sim.state, self.flight, source))
 
     def reset(self) -> None:
-        """Put the disc back to its launch, at rest; forget commands and the number of flights."""
+        """Put the disc at its launch, at rest; discard commands and count flights from 1 again."""
         self._take_config()
         self._sim = None
         self._resting = at_rest(self.config.launch.state())
         self._throw_at = math.inf
         self.flight = 0
-        self.commands.forget()
-        self._hold_moment(_NO_MOMENT, math.inf)
-        self._hold_coefficients(_NO_COEFFICIENTS, math.inf)
-        self._blow(self.config.setup.wind)
-        self.outputs.begin_path()
-        self.publish_look()
-        self._event('reset', 'the disc is back at its launch, at rest', {})
+        self.commands.clear()
+        self._set_moment(_NO_MOMENT, math.inf)
+        self._set_coefficients(_NO_COEFFICIENTS, math.inf)
+        self._set_wind(self.config.setup.wind)
+        self.publishers.clear_path()
+        self.publish_markers()
+        self._publish_event(events.RESET)
 
     def configure(self, config: SimConfig) -> None:
         """Take changed parameters: wind and pace at once, the rest at the next throw."""
@@ -219,12 +216,12 @@ class Simulation:
         self.config = replace(self.config, **changed)
         old, new = before.setup.wind, config.setup.wind
         if replace(new, turbulence=old.turbulence, seed=old.seed) != old:
-            self._blow(new)  # gusts wait for the next throw, and do not undo a commanded wind
+            self._set_wind(new)  # a change of gusts alone does not undo a commanded wind
         if config.throw_period != before.throw_period and self.flight:
             self._throw_at = self._after_period()
 
     def _after_period(self) -> float:
-        """Return when to throw again [ns], or infinity."""
+        """Return the stamp of the next periodic throw [ns], or inf."""
         period = self.config.throw_period
         return self._released + round(period * NANOSECONDS) if period > 0.0 else math.inf
 
@@ -233,76 +230,66 @@ class Simulation:
         before, self.config = self.config, self._next_config
         now = self.config
         if (now.physics_rate, now.publish_rate) != (before.physics_rate, before.publish_rate):
-            self.timeline.restart(now.physics_rate)
+            self.clock.restart(now.physics_rate)
 
-    def _tell_landing(self, sim: FlightSimulator) -> None:
+    def _publish_landing(self, sim: FlightSimulator) -> None:
         self.counts.landings += 1
-        touch, release = sim.touch, sim.release
-        distance = math.hypot(touch.X - release.X, touch.Y - release.Y)
-        x, y, _ = frames.flip_yz((touch.X, touch.Y, touch.Z))
-        values = {
-            'stamp_s': in_seconds(self._released + round(sim.touch_time * NANOSECONDS)),
-            'flight': self.flight,
-            'flight_time_s': sim.touch_time,
-            'range_m': distance,
-            'landing_x_m': x,
-            'landing_y_m': y,
-            'spin_rad_s': touch.r,
-        }
-        text = f'{distance:.2f} m in {sim.touch_time:.3f} s'
-        self._event('landed', text, values)
-        self.outputs.landed(release, touch, sim.setup.disc.diameter, text)
+        event = events.landed(sim, self.flight, self._released)
+        self._publish_event(event)
+        self.publishers.publish_landing(
+            sim.release, sim.touch, sim.setup.disc.diameter, event.text
+        )
 
     # ---- commands and wind ----
 
     def poll(self) -> None:
         """Take the commands that have arrived."""
-        self.commands.poll(
-            self.timeline.now,
-            lambda topic: self._warn(f'{topic.name} dropped: {topic.reason}', topic.name),
-        )
+        self.commands.poll(self.clock.now, self._warn_of_drop)
 
-    def _change(self) -> None:
+    def _warn_of_drop(self, topic: CommandTopic) -> None:
+        self._warn(f'{topic.name} dropped: {topic.reason}', topic.name)
+
+    def _apply_changes(self) -> None:
         """Let commands and wind begin or end that do so at the present step."""
-        now = self.timeline.now
+        now = self.clock.now
         until = now + round(self.config.command_timeout * NANOSECONDS)
-        moment, coefficients = self.held.expired(now)
-        if moment:
-            self._hold_moment(_NO_MOMENT, math.inf)
-        if coefficients:
-            self._hold_coefficients(_NO_COEFFICIENTS, math.inf)
-        if moment or coefficients:
+        moment_expired, coefficients_expired = self.active.expired(now)
+        if moment_expired:
+            self._set_moment(_NO_MOMENT, math.inf)
+        if coefficients_expired:
+            self._set_coefficients(_NO_COEFFICIENTS, math.inf)
+        if moment_expired or coefficients_expired:
             self.counts.expired += 1
-            self._event('command expired', 'a command was not renewed and fell to zero', {})
-        new_moment = pop_due(self.commands.moment, now)
-        if new_moment is not None:
-            self._hold_moment(new_moment, until)
-        new_coefficients = pop_due(self.commands.coefficients, now)
-        if new_coefficients is not None:
-            self._hold_coefficients(new_coefficients, until)
+            self._publish_event(events.COMMAND_EXPIRED)
+        moment = pop_due(self.commands.moment, now)
+        if moment is not None:
+            self._set_moment(moment, until)
+        coefficients = pop_due(self.commands.coefficients, now)
+        if coefficients is not None:
+            self._set_coefficients(coefficients, until)
         mean = pop_due(self.commands.wind, now)
         if mean is not None:
-            self._blow(replace(self._wind, mean=mean))
+            self._set_wind(replace(self._wind, mean=mean))
 
-    def _hold_moment(self, moment: tuple[float, float, float, int], until: float) -> None:
-        before = self.held.control
-        self.held.set_moment(moment, until)
-        if self.held.control != before:
-            self.outputs.moment_applied(self.timeline.now, moment)
-            self._steer()
+    def _set_moment(self, moment: tuple[float, float, float, int], until: float) -> None:
+        before = self.active.control
+        self.active.set_moment(moment, until)
+        if self.active.control != before:
+            self.publishers.publish_applied_moment(self.clock.now, moment)
+            self._control_disc()
 
-    def _hold_coefficients(self, values: tuple[float, float, float], until: float) -> None:
-        before = self.held.control
-        self.held.set_coefficients(values, until)
-        if self.held.control != before:
-            self.outputs.coefficients_applied(self.timeline.now, values)
-            self._steer()
+    def _set_coefficients(self, values: tuple[float, float, float], until: float) -> None:
+        before = self.active.control
+        self.active.set_coefficients(values, until)
+        if self.active.control != before:
+            self.publishers.publish_applied_coefficients(self.clock.now, values)
+            self._control_disc()
 
-    def _steer(self) -> None:
+    def _control_disc(self) -> None:
         if self._sim is not None:
-            self._sim.take(self.held.control)
+            self._sim.take(self.active.control)
 
-    def _blow(self, wind: Wind) -> None:
+    def _set_wind(self, wind: Wind) -> None:
         """Change mean and profile of the wind now; turbulence and seed wait for the next throw."""
         self._wind = wind
         if self._sim is not None:
@@ -313,22 +300,24 @@ class Simulation:
     # ---- messages ----
 
     def publish(self) -> None:
-        """Publish the present state."""
-        out, sim, now = self.outputs, self._sim, self.timeline.now
-        out.tick(now)
+        """Publish the present state on the topics that have subscribers."""
+        out, sim, now = self.publishers, self._sim, self.clock.now
+        out.publish_clock(now)
         s = self._resting if sim is None else sim.state
-        out.motion(now, s)
-        if out.quantities_heard:
+        out.publish_motion(now, s)
+        if out.quantities_have_subscribers:
             wind = Velocity(*self._wind.mean) if sim is None else sim.wind
-            out.quantities_of(messages.quantities(s, wind, self.config.setup.disc.diameter))
-        if out.imu.heard or out.aero_wrench.heard:
-            seen = NOTHING if sim is None else sim.observe()
-            if out.aero_wrench.heard:
-                out.loads(now, (*frames.flip_yz(seen[6:9]), *frames.flip_yz(seen[9:12])))
-            if out.imu.heard:
+            diameter = self.config.setup.disc.diameter
+            out.publish_quantities(messages.quantities(s, wind, diameter))
+        if out.imu.has_subscribers or out.aero_wrench.has_subscribers:
+            observed = NOTHING if sim is None else sim.observe()
+            if out.aero_wrench.has_subscribers:
+                force, moment = frames.flip_yz(observed[6:9]), frames.flip_yz(observed[9:12])
+                out.publish_aero_wrench(now, (*force, *moment))
+            if out.imu.has_subscribers:
                 errors, g = self._imu_errors, self.config.setup.air.gravity
-                exact = messages.imu(s, seen[:3], seen[3:6], errors.offset, g)
-                out.measured(now, errors.of(exact, self._sample()))
+                exact = messages.imu(s, observed[:3], observed[3:6], errors.offset, g)
+                out.publish_imu(now, errors.add_to(exact, self._sample()))
         rate = self.config.path_rate
         if not self.flying or rate == 0.0:
             return
@@ -338,33 +327,29 @@ class Simulation:
     def publish_wind(self) -> None:
         """Publish the mean wind that blows."""
         mean = frames.map_from_paper(self._wind.mean) + 0.0
-        self.outputs.wind_applied(self.timeline.now, mean.tolist())
+        self.publishers.publish_applied_wind(self.clock.now, mean.tolist())
 
-    def publish_look(self) -> None:
-        """Publish the disc that waits for its throw, to look at."""
-        self.outputs.look(self._resting, self.config.setup.disc.diameter)
+    def publish_markers(self) -> None:
+        """Publish the markers of the disc that waits for its throw."""
+        self.publishers.publish_markers(self._resting, self.config.setup.disc.diameter)
 
     def _sample(self) -> int:
         """Return the number of messages since the release."""
-        elapsed = (self.timeline.now - self._released) * self.config.publish_rate
+        elapsed = (self.clock.now - self._released) * self.config.publish_rate
         return round(elapsed / NANOSECONDS)
 
-    def _publish_held(self) -> None:
-        """Tell again what acts already, for who records from this throw on."""
-        c, now = self.held.control, self.timeline.now
+    def _publish_active_control(self) -> None:
+        """Publish the active control again, for a recording that begins with this throw."""
+        c, now = self.active.control, self.clock.now
         if any((c.L, c.M, c.N)):
-            self.outputs.moment_applied(now, (c.L, c.M, c.N, c.axes))
+            self.publishers.publish_applied_moment(now, (c.L, c.M, c.N, c.axes))
         if any((c.C_L, c.C_M, c.C_N)):
-            self.outputs.coefficients_applied(now, (c.C_L, c.C_M, c.C_N))
+            self.publishers.publish_applied_coefficients(now, (c.C_L, c.C_M, c.C_N))
 
-    def _event(self, name: str, text: str, values: dict[str, Any], *, bad: bool = False) -> None:
-        stamp = {'stamp_s': in_seconds(self.timeline.now)}
-        self.outputs.event(name, text, stamp | values, bad=bad)
-
-
-def in_seconds(nanoseconds: int) -> str:
-    """Return a time in seconds, exact: as floats, times of today have steps of 240 ns."""
-    return f'{nanoseconds // NANOSECONDS}.{nanoseconds % NANOSECONDS:09d}'
+    def _publish_event(self, event: Event) -> None:
+        """Publish an event, stamped with the present time unless it has a stamp of its own."""
+        values = {'stamp_s': events.in_seconds(self.clock.now)} | event.values
+        self.publishers.publish_event(event.name, event.text, values, is_error=event.is_error)
 
 
 def at_rest(s: State) -> State:

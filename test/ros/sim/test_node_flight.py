@@ -1,6 +1,6 @@
-"""sim_node in a process of its own flies what the core flies, and all that it says agrees.
+"""sim_node in its own process: its flights are those of `physics`, and its messages agree.
 
-Positions, attitudes and rates are compared to the last bit: messages only turn their signs.
+Positions, attitudes and rates are compared to the last bit: messages only change their signs.
 """
 
 import math
@@ -25,26 +25,26 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.kernels.equations import DISC, DISC_BODY
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
-from disc_sim_ros.ros import messages as conversions
-from ros.bench import (
+from disc_sim_ros.ros import messages
+from ros.sim.paused_sim import (
     FLOATS,
-    KINDS,
     MS,
-    ONCE,
+    NOT_PERIODIC,
     SECOND,
     SHORT,
     START,
-    Bench,
+    TYPES,
+    PausedSim,
     assert_flown,
-    blown,
     coefficients,
+    control_change,
     launch_parameters,
     moment,
     ns,
     numbers,
-    replayed,
-    steered,
+    resimulated,
     wind,
+    wind_change,
 )
 
 pytestmark = pytest.mark.ros
@@ -54,7 +54,7 @@ pytestmark = pytest.mark.ros
 
 
 def test_the_flight_does_not_depend_on_the_clock(ros, request):
-    """Same launch, commands and seeds at four paces, on a busy machine and through a stall."""
+    """Same launch, commands and seeds at four paces, on a busy machine and with a stall."""
     paces = {'at_0': 0.0, 'at_half': 0.5, 'at_1': 1.0, 'at_10': 10.0, 'stalled': 1.0}
     parameters = launch_parameters(SHORT) | {
         'wind.x': 2.0,
@@ -72,51 +72,51 @@ def test_the_flight_does_not_depend_on_the_clock(ros, request):
         coefficients(START + 300 * MS, -0.02, 0.0, 0.0),
         wind(START + 450 * MS, -3.0, 1.0, 0.5),
     ]
-    told = (topics.IMU, *ONCE)
-    benches = [Bench(ros, parameters, *told, namespace=f'/{name}') for name in paces]
-    for bench in benches:
-        bench.ready()
-    for bench in benches:
-        bench.send(*commands)
-        bench.throw()
+    subscribed = (topics.IMU, *NOT_PERIODIC)
+    nodes = [PausedSim(ros, parameters, *subscribed, namespace=f'/{name}') for name in paces]
+    for node in nodes:
+        node.ready()
+    for node in nodes:
+        node.send(*commands)
+        node.throw()
     for _ in range(2):
         busy = subprocess.Popen([sys.executable, '-c', 'while True: pass'])
         request.addfinalizer(busy.wait)
         request.addfinalizer(busy.kill)
-    for bench, pace in zip(benches, paces.values(), strict=True):
-        bench.go(pace)
-    stalled = benches[-1]
+    for node, pace in zip(nodes, paces.values(), strict=True):
+        node.go(pace)
+    stalled = nodes[-1]
     stalled.wait_for(20)
     stalled.sim.process.send_signal(signal.SIGSTOP)
-    benches[2].wait_for_event('landed')
+    nodes[2].wait_for_event('landed')
     stalled.sim.process.send_signal(signal.SIGCONT)
 
     setup = Setup(disc=FRISBEE, wind=Wind(mean=(2.0, -1.0, 0.0), turbulence=15.0, seed=7))
     changes = [
-        (0, steered(M=-0.01, axes=DISC)),
-        (101, steered(C_L=0.02, C_M=-0.01, C_N=0.001)),
-        (200, steered(L=0.05, M=0.0, N=-0.001, axes=DISC_BODY)),
-        (300, steered(C_L=-0.02, C_M=0.0, C_N=0.0)),
-        (450, blown(-3.0, 1.0, 0.5)),
-        (450, steered(L=0.0, M=0.0, N=0.0)),
-        (550, steered(C_L=0.0)),
+        (0, control_change(M=-0.01, axes=DISC)),
+        (101, control_change(C_L=0.02, C_M=-0.01, C_N=0.001)),
+        (200, control_change(L=0.05, M=0.0, N=-0.001, axes=DISC_BODY)),
+        (300, control_change(C_L=-0.02, C_M=0.0, C_N=0.0)),
+        (450, wind_change(-3.0, 1.0, 0.5)),
+        (450, control_change(L=0.0, M=0.0, N=0.0)),
+        (550, control_change(C_L=0.0)),
     ]
-    core, states = replayed(setup, SHORT.state(), 251, 5, changes)
-    count = math.ceil(core.touch_time * 200.0) + 1  # the last one lies on the ground
+    sim, states = resimulated(setup, SHORT.state(), 251, 5, changes)
+    count = math.ceil(sim.touch_time * 200.0) + 1  # the last one is on the ground
     assert 200 < count < 251
-    for bench in benches:
-        landing = bench.wait_for_event('landed')
-        assert float(landing['flight_time_s']) == core.touch_time
-        odometry = bench.wait_for(count)
+    for node in nodes:
+        landing = node.wait_for_event('landed')
+        assert float(landing['flight_time_s']) == sim.touch_time
+        odometry = node.wait_for(count)
         assert [ns(m) - START for m in odometry] == [5 * MS * k for k in range(count)]
         assert_flown(odometry, states[:count])
-        # What else is said is the same to the last digit, too.
+        # The other messages are the same to the last digit, too.
         for topic, number in {topics.IMU: count, **CHANGES}.items():
-            said, first = (b.all_of(topic, number)[:count] for b in (bench, benches[0]))
+            published, first = (n.all_of(topic, number)[:count] for n in (node, nodes[0]))
             if topic == topics.FLIGHT_EVENTS:
-                assert [e.values for e in said] == [e.values for e in first]
+                assert [e.values for e in published] == [e.values for e in first]
             else:
-                assert said == first
+                assert published == first
 
 
 CHANGES = {
@@ -133,81 +133,83 @@ CHANGES = {
     ('physics', 'publish'), [(1000, 200), (3000, 100), (770, 70)], ids=lambda rate: f'{rate}Hz'
 )
 def test_stamps_are_even_over_throws(ros, physics, publish):
-    """Message k is stamped START + floor(k / rate): no error adds up, and no throw shifts it."""
+    """The stamp of message k is START + floor(k / rate): no error adds up, no throw shifts it."""
     rates = {'physics_rate': float(physics), 'publish_rate': float(publish)}
-    bench = Bench(ros, rates | {'throw_period': 0.333}, *ONCE, topics.JOINT_STATES).ready()
-    bench.throw()
-    bench.go(20.0)
-    releases = [ns(m) for m in bench.all_of(topics.RELEASE, 4)[:4]]
+    node = PausedSim(
+        ros, rates | {'throw_period': 0.333}, *NOT_PERIODIC, topics.JOINT_STATES
+    ).ready()
+    node.throw()
+    node.go(20.0)
+    releases = [ns(m) for m in node.all_of(topics.RELEASE, 4)[:4]]
     count = math.ceil(3 * 0.333 * publish)
-    odometry = bench.wait_for(count)
+    odometry = node.wait_for(count)
     assert [ns(m) for m in odometry] == [START + k * SECOND // publish for k in range(count)]
-    assert [ns(m) for m in bench[topics.JOINT_STATES][:count]] == [ns(m) for m in odometry]
-    # A throw is due with the first message not before its period is over.
+    assert [ns(m) for m in node[topics.JOINT_STATES][:count]] == [ns(m) for m in odometry]
+    # A throw is due at the first message not before the end of its period.
     wait = math.ceil(0.333 * publish)
     assert releases == [START + wait * n * SECOND // publish for n in range(4)]
 
 
 def test_new_rates_begin_with_a_throw(ros):
-    bench = Bench(ros, {'physics_rate': 1000.0, 'publish_rate': 200.0}, *ONCE).ready()
-    bench.throw()
-    bench.go(5.0)
+    node = PausedSim(ros, {'physics_rate': 1000.0, 'publish_rate': 200.0}, *NOT_PERIODIC).ready()
+    node.throw()
+    node.go(5.0)
     for flight, (physics, publish) in enumerate([(1000, 250), (3000, 100), (770, 70)], start=2):
-        bench.wait_for(1)
-        bench.set(physics_rate=float(physics), publish_rate=float(publish))
-        bench.throw()
-        release = ns(bench.all_of(topics.RELEASE, flight)[-1])
-        stamps = [ns(m) for m in bench.since(release, 30)]
+        node.wait_for(1)
+        node.set(physics_rate=float(physics), publish_rate=float(publish))
+        node.throw()
+        release = ns(node.all_of(topics.RELEASE, flight)[-1])
+        stamps = [ns(m) for m in node.since(release, 30)]
         assert stamps == [release + k * SECOND // publish for k in range(30)]
 
 
-# ---- one step, many topics ----
+# ---- one step on all topics ----
 
 
-def test_all_that_is_said_of_one_step_agrees(ros):
-    """With each other, with the core, and with the laws of motion."""
+def test_all_messages_of_one_step_agree(ros):
+    """They agree with each other, with `physics`, and with the laws of motion."""
     parameters = launch_parameters(SHORT) | {
         'physics_rate': 4000.0,
         'publish_rate': 1000.0,
-        'aero': 'linear',  # the table has kinks, and differences an error at each
+        'aero': 'linear',  # finite differences have an error at each kink of the table
         'imu.offset': list(OFFSET),
         'wind.x': 3.0,
         'wind.y': -2.0,
         'wind.roughness_length': 0.03,
     }
-    bench = Bench(ros, parameters, *KINDS).ready()
-    bench.throw()
-    bench.go(1.0)
+    node = PausedSim(ros, parameters, *TYPES).ready()
+    node.throw()
+    node.go(1.0)
     count = 400
-    odometry = bench.wait_for(count)
-    ros.pause(bench.sim)  # 14 topics at 1 kHz are more than one listener in Python can take
-    transforms = bench.all_of(topics.TRANSFORM, 2 * count)[: 2 * count]
-    said = {name: messages[:count] for name, messages in bench.heard.items()}
+    odometry = node.wait_for(count)
+    ros.pause(node.sim)  # 14 topics at 1 kHz are more than a node in Python can take
+    transforms = node.all_of(topics.TRANSFORM, 2 * count)[: 2 * count]
+    published = {name: received[:count] for name, received in node.received.items()}
     tilts, turns = transforms[::2], transforms[1::2]
 
-    for messages, parent, child in (
+    for received, parent, child in (
         (odometry, 'map', 'disc'),
-        (said[topics.POSE], 'map', None),
+        (published[topics.POSE], 'map', None),
         (tilts, 'map', 'disc'),
         (turns, 'disc', 'disc_body'),
-        (said[topics.JOINT_STATES], '', None),
-        (said[topics.IMU], 'disc_body', None),
-        (said[topics.AERO_WRENCH], 'disc', None),
+        (published[topics.JOINT_STATES], '', None),
+        (published[topics.IMU], 'disc_body', None),
+        (published[topics.AERO_WRENCH], 'disc', None),
     ):
-        assert [ns(m) for m in messages] == [START + MS * k for k in range(count)]
-        assert {m.header.frame_id for m in messages} == {parent}
-        assert {getattr(m, 'child_frame_id', None) for m in messages} == {child}
+        assert [ns(m) for m in received] == [START + MS * k for k in range(count)]
+        assert {m.header.frame_id for m in received} == {parent}
+        assert {getattr(m, 'child_frame_id', None) for m in received} == {child}
 
-    # The same numbers in other words.
-    odom = numbers(odometry, conversions.ODOMETRY_FIELDS)
-    assert_array_equal(numbers(said[topics.POSE], conversions.POSE_FIELDS), odom[:, :7])
-    assert_array_equal(numbers(tilts, conversions.TRANSFORM_FIELDS), odom[:, :7])
-    angle, rate = numbers(said[topics.JOINT_STATES], conversions.JOINT_FIELDS).T
+    # The same numbers in other messages.
+    odom = numbers(odometry, messages.ODOMETRY_FIELDS)
+    assert_array_equal(numbers(published[topics.POSE], messages.POSE_FIELDS), odom[:, :7])
+    assert_array_equal(numbers(tilts, messages.TRANSFORM_FIELDS), odom[:, :7])
+    angle, rate = numbers(published[topics.JOINT_STATES], messages.JOINT_FIELDS).T
     assert_array_equal(rate, odom[:, 12])
-    spin = Rotation.from_quat(numbers(turns, conversions.TRANSFORM_FIELDS)[:, 3:])
+    spin = Rotation.from_quat(numbers(turns, messages.TRANSFORM_FIELDS)[:, 3:])
     # Rounding of angles up to 30 rad, and of rates of 40 rad/s.
     assert_allclose(spin.as_rotvec(), np.outer(angle, (0.0, 0.0, 1.0)), atol=1e-13)
-    imu = numbers(said[topics.IMU], conversions.IMU_FIELDS)
+    imu = numbers(published[topics.IMU], messages.IMU_FIELDS)
     assert_allclose(spin.apply(imu[:, :3]), odom[:, 10:], rtol=0.0, atol=1e-13)
 
     setup = Setup(
@@ -216,13 +218,14 @@ def test_all_that_is_said_of_one_step_agrees(ros):
         wind=Wind(mean=(3.0, 2.0, 0.0), roughness_length=0.03),
         step=1.0 / 4000.0,
     )
-    wrench = numbers(said[topics.AERO_WRENCH], conversions.WRENCH_FIELDS)
-    assert_core_says(setup, odometry, angle, wrench, {name: said[name] for name in FLOATS})
-    assert_lawful(odom, spin, imu, wrench)
+    wrench = numbers(published[topics.AERO_WRENCH], messages.WRENCH_FIELDS)
+    floats = {name: published[name] for name in FLOATS}
+    assert_is_that_of_physics(setup, odometry, angle, wrench, floats)
+    assert_obeys_the_laws_of_motion(odom, spin, imu, wrench)
 
 
-def assert_core_says(setup, odometry, angle, wrench, floats):
-    """State and loads are those of the core, and the rest what the core makes of it."""
+def assert_is_that_of_physics(setup, odometry, angle, wrench, floats):
+    """State, loads and quantities are those of `physics`."""
     count = len(odometry)
     flown = fly(SHORT, setup, sample_rate=1000.0).trajectory
     states = flown.rows[:count, 1:15]
@@ -235,22 +238,23 @@ def assert_core_says(setup, odometry, angle, wrench, floats):
         flown.advance_ratio,
         flown.spin,
     )
-    for (name, messages), expected in zip(floats.items(), quantities, strict=True):
-        values = numbers(messages, ['data'])[:, 0]
+    for (name, received), expected in zip(floats.items(), quantities, strict=True):
+        values = numbers(received, ['data'])[:, 0]
         assert_allclose(values, expected[:count], rtol=1e-12, atol=1e-13, err_msg=name)
     sim = FlightSimulator(setup, SHORT.state())
     for row in wrench:
-        seen = sim.observe()
-        assert_array_equal(row, [*frames.flip_yz(seen[6:9]), *frames.flip_yz(seen[9:12])])
+        observed = sim.observe()
+        force, moment = frames.flip_yz(observed[6:9]), frames.flip_yz(observed[9:12])
+        assert_array_equal(row, [*force, *moment])
         sim.advance(4)
 
 
-def assert_lawful(odom, spin, imu, wrench):
+def assert_obeys_the_laws_of_motion(odom, spin, imu, wrench):
     """Velocities, rates and specific force are those of the motion of the poses alone.
 
-    Differences of sixth order over h = 1 ms: rounding of positions by 2e-15 m makes 1e-11 m/s and
-    1e-8 m/s^2 of them; turning at 40 rad/s and nutating at 80 rad/s, (80 h)^6 / 140 of each rate
-    is missing, and RK4 itself lags by (20 h)^4 / 120 of it.
+    Finite differences of sixth order over h = 1 ms: rounding of positions by 2e-15 m makes errors
+    of 1e-11 m/s and 1e-8 m/s^2; with a spin of 40 rad/s and a nutation of 80 rad/s, (80 h)^6 / 140
+    of each rate is missing, and RK4 itself lags by (20 h)^4 / 120 of it.
     """
     tilt = Rotation.from_quat(odom[:, 3:7])
     velocity = tilt.apply(odom[:, 7:10])
@@ -263,16 +267,16 @@ def assert_lawful(odom, spin, imu, wrench):
     up = np.array([0.0, 0.0, 9.81])
     sensor = odom[:, :3] + plastic.apply(OFFSET)
     acceleration = np.column_stack([np.convolve(x, BEND, 'valid') for x in sensor.T]) / 180e-6
-    felt = plastic[INNER].inv().apply(acceleration + up)
-    assert_allclose(imu[INNER, 3:], felt, atol=1e-5)
-    assert np.abs(felt[:, 0]).min() > 100.0  # 40 rad/s at 0.1 m
-    pushed = FRISBEE.mass * (slope(velocity) + up)
-    assert_allclose(tilt.apply(wrench[:, :3])[INNER], pushed, atol=1e-8)
+    specific_force = plastic[INNER].inv().apply(acceleration + up)
+    assert_allclose(imu[INNER, 3:], specific_force, atol=1e-5)
+    assert np.abs(specific_force[:, 0]).min() > 100.0  # 40 rad/s at 0.1 m
+    force = FRISBEE.mass * (slope(velocity) + up)
+    assert_allclose(tilt.apply(wrench[:, :3])[INNER], force, atol=1e-8)
 
 
 OFFSET = (0.1, 0.05, 0.02)  # m, of the IMU
 INNER = slice(3, -3)  # where there are differences
-SLOPE = (1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0)  # over 60 h; a convolution turns it round
+SLOPE = (1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0)  # over 60 h; a convolution reverses it
 BEND = (2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0)  # over 180 h^2
 
 
@@ -282,7 +286,7 @@ def slope(values):
 
 
 def turning(rotations):
-    """Return the angular velocity [rad/s], in the axes that turn, from quaternions at 1 kHz."""
+    """Return the angular velocity [rad/s] in the rotating axes, from quaternions at 1 kHz."""
     q = rotations.as_quat()
     flips = np.sign((q[1:] * q[:-1]).sum(axis=1)).cumprod()
     q[1:] *= flips[:, None]  # q and -q are one rotation: take the nearer one
@@ -297,33 +301,36 @@ def turning(rotations):
 
 
 def test_imu_in_free_fall_and_on_the_ground(ros):
-    """Nothing at the centre of a falling disc, the pull to the axis beside it, +g at rest."""
+    """0 at the centre of a falling disc, centripetal acceleration beside it, +g at rest."""
     falling = Launch(speed=5.0, pitch=0.0, roll=0.0, spin=50.0, height=1.0)
     parameters = launch_parameters(falling) | {'air_density': 0.0}
-    bench = Bench(ros, parameters, topics.IMU, *ONCE).ready()
+    node = PausedSim(ros, parameters, topics.IMU, *NOT_PERIODIC).ready()
     in_the_air = math.floor(math.sqrt(2.0 / 9.81) * 200.0) + 1
     # At 50 rad/s and 0.1 m: 250 m/s^2.
-    for offset, pull in (((0.0, 0.0, 0.0), (0.0, 0.0)), ((0.1, -0.02, 0.01), (-250.0, 50.0))):
-        bench.set(imu__offset=list(offset))
-        bench.reset()
-        bench.throw()
-        bench.go()
-        bench.wait_for(in_the_air + 1)
-        ros.pause(bench.sim)
-        imu = numbers(bench[topics.IMU], conversions.IMU_FIELDS)
+    for offset, centripetal in (
+        ((0.0, 0.0, 0.0), (0.0, 0.0)),
+        ((0.1, -0.02, 0.01), (-250.0, 50.0)),
+    ):
+        node.set(imu__offset=list(offset))
+        node.reset()
+        node.throw()
+        node.go()
+        node.wait_for(in_the_air + 1)
+        ros.pause(node.sim)
+        imu = numbers(node[topics.IMU], messages.IMU_FIELDS)
         assert_allclose(imu[:in_the_air, :3], [[0.0, 0.0, -50.0]] * in_the_air, atol=1e-12)
-        assert_allclose(imu[:in_the_air, 3:], [[*pull, 0.0]] * in_the_air, atol=1e-12)
+        assert_allclose(imu[:in_the_air, 3:], [[*centripetal, 0.0]] * in_the_air, atol=1e-12)
         assert imu[in_the_air:].tolist() == [[0.0, 0.0, 0.0, 0.0, 0.0, 9.81]]
 
-    bench.set(launch__speed=0.0, launch__roll=30.0, launch__pitch=-20.0)
-    bench.reset()
-    bench.throw()
-    bench.go()
-    odometry = bench.wait_for(in_the_air + 1)
-    imu = numbers(bench[topics.IMU], conversions.IMU_FIELDS)
-    spin = bench[topics.IMU][-1]
+    node.set(launch__speed=0.0, launch__roll=30.0, launch__pitch=-20.0)
+    node.reset()
+    node.throw()
+    node.go()
+    odometry = node.wait_for(in_the_air + 1)
+    imu = numbers(node[topics.IMU], messages.IMU_FIELDS)
+    spin = node[topics.IMU][-1]
     assert np.linalg.norm(imu[-1, 3:]) == pytest.approx(9.81, rel=1e-15)
-    # Tilted by acos(cos 30 cos 20) from the vertical, however far it has turned about its axis.
+    # Tilted by acos(cos 30 cos 20) from the vertical, whatever its spin angle.
     upright = math.cos(math.radians(30.0)) * math.cos(math.radians(20.0))
     assert imu[-1, 5] == pytest.approx(9.81 * upright, rel=1e-14)
     assert odometry[-1].pose.pose.position.z == spin.angular_velocity.z == 0.0

@@ -1,6 +1,6 @@
-"""A simulator at a bench: its time stands still until a test lets it go.
+"""A simulator that is paused until a test lets it go.
 
-Time stands still at START while a test prepares a flight: the simulator starts as fast as
+Simulated time stands at START while a test prepares a flight: the simulator starts as fast as
 possible with nothing to fly, is paused, gets its throw and commands, and is let go at some pace.
 """
 
@@ -21,15 +21,15 @@ from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.kernels.equations import DISC, DISC_AIR, DISC_BODY
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
-from disc_sim_ros.ros import messages as conversions
+from disc_sim_ros.ros import messages
 from disc_sim_ros.ros.cdr_template import assign
 
 SECOND = 1_000_000_000  # ns
-START = 1000 * SECOND  # stamp at which time stands still
+START = 1000 * SECOND  # stamp at which the simulator is paused
 MS = 1_000_000
 FLOATS = ('airspeed', 'angle_of_attack', 'absolute_attitude', 'advance_ratio', 'spin_rate')
-# In the order of subscription. Discovery keeps it: who hears odom has a match for the others.
-KINDS = {
+# In the order of subscription. Discovery keeps it: once odom arrives, the others are matched.
+TYPES = {
     topics.FLIGHT_EVENTS: DiagnosticStatus,
     topics.CONFIGURATION: String,
     topics.RELEASE: Odometry,
@@ -44,7 +44,7 @@ KINDS = {
     **dict.fromkeys(FLOATS, Float64),
     topics.ODOM: Odometry,
 }
-ONCE = tuple(KINDS)[:6]
+NOT_PERIODIC = tuple(TYPES)[:6]
 COMMANDS = {
     topics.CMD_MOMENT: WrenchStamped,
     topics.CMD_COEFFICIENTS: Vector3Stamped,
@@ -57,50 +57,50 @@ AXES_OF = {'disc': DISC, 'disc_body': DISC_BODY, 'disc_air': DISC_AIR, '': DISC_
 SHORT = Launch(speed=13.0, pitch=-3.0, roll_rate=2.0, pitch_rate=-1.0, spin=40.0, height=1.0)
 
 
-# ---- a simulator that waits ----
+# ---- the simulator ----
 
 
-class Bench:
-    """A simulator whose time stands still, what it says, and its command topics.
+class PausedSim:
+    """A paused simulator, the messages that it publishes, and its command topics.
 
     Attributes:
         sim: Its process.
-        heard: Messages by topic, since the last `ros.forget`.
+        received: Messages by topic, since the last `ros.forget`.
     """
 
     def __init__(self, ros, parameters, *names, namespace=''):
-        still = {'auto_throw': False, 'real_time_factor': 0.0, 'start_time': START / SECOND}
+        start = {'auto_throw': False, 'real_time_factor': 0.0, 'start_time': START / SECOND}
         self.ros = ros
-        self.sim = ros.start(still | parameters, namespace=namespace)
-        self.heard = {
-            name: ros.listen(kind, f'{namespace}/{name}')
-            for name, kind in KINDS.items()
+        self.sim = ros.start(start | parameters, namespace=namespace)
+        self.received = {
+            name: ros.subscribe(message_type, f'{namespace}/{name}')
+            for name, message_type in TYPES.items()
             if name in names or name == topics.ODOM
         }
         self._publishers = {
-            name: ros.node.create_publisher(kind, f'{namespace}/{name}', 1000)
-            for name, kind in COMMANDS.items()
+            name: ros.node.create_publisher(message_type, f'{namespace}/{name}', 1000)
+            for name, message_type in COMMANDS.items()
         }
 
     def ready(self):
-        """Wait until it stands still and is heard."""
+        """Wait until it is paused and its messages arrive."""
         self.ros.pause(self.sim)
         self.reset()
         return self
 
     def __getitem__(self, name):
-        return self.heard[name]
+        return self.received[name]
 
     def reset(self):
-        """Bring a paused simulator back to flight 0, and forget what it said."""
-        odom = self.heard[topics.ODOM]
+        """Bring the paused simulator back to flight 0, and forget what it published."""
+        odom = self[topics.ODOM]
         self.ros.forget()
         self.ros.spin_until(lambda: self.ros.call(self.sim, 'reset').success and odom, 'odom')
         self.ros.forget()
 
-    def send(self, *messages):
-        """Send commands, each to the topic of its kind, and wait until they have arrived."""
-        for topic, message in messages:
+    def send(self, *commands):
+        """Send commands, pairs of topic and message, and wait until they have arrived."""
+        for topic, message in commands:
             self.ros.send(self.sim, self._publishers[topic], message)
 
     def throw(self):
@@ -108,7 +108,7 @@ class Bench:
         assert response.success, response.message
 
     def set(self, **values):
-        """Set parameters; `__` in a name is a point."""
+        """Set parameters; `__` in a name is a dot."""
         changes = {name.replace('__', '.'): value for name, value in values.items()}
         result = self.ros.set(self.sim, changes)
         assert result.successful, result.reason
@@ -116,21 +116,19 @@ class Bench:
     def go(self, pace=0.0):
         """Let time go on at a pace: a real_time_factor."""
         self.set(real_time_factor=pace)
-        self.ros.pause(self.sim, still=False)
+        self.ros.resume(self.sim)
 
     def wait_for(self, count):
-        """Wait until every topic of states has told `count` states, and return these of odom."""
-        states = [heard for name, heard in self.heard.items() if name not in ONCE]
-        self.ros.spin_until(
-            lambda: all(len(heard) >= count for heard in states), f'{count} messages'
-        )
+        """Wait for `count` messages on every periodic topic, and return those of odom."""
+        periodic = [m for name, m in self.received.items() if name not in NOT_PERIODIC]
+        self.ros.spin_until(lambda: all(len(m) >= count for m in periodic), f'{count} messages')
         return self[topics.ODOM][:count]
 
     def all_of(self, name, count):
-        """Wait for the last of `count` messages of a topic, and return all there are."""
-        heard = self.heard[name]
-        self.ros.spin_until(lambda: len(heard) >= count, f'{count} of {name}')
-        return heard
+        """Wait until there are `count` messages of a topic, and return all there are."""
+        received = self[name]
+        self.ros.spin_until(lambda: len(received) >= count, f'{count} of {name}')
+        return received
 
     def since(self, release, count):
         """Wait for `count` messages of odom from a release on, and return them."""
@@ -159,9 +157,9 @@ def launch_parameters(launch):
 # ---- messages ----
 
 
-def stamped(kind, at, values, paths, frame=''):
+def stamped(message_type, at, values, paths, frame=''):
     """Return a message with a stamp [ns] and these numbers."""
-    message = kind()
+    message = message_type()
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(at, SECOND)
     message.header.frame_id = frame
     for path, value in zip(paths, values, strict=True):
@@ -170,17 +168,17 @@ def stamped(kind, at, values, paths, frame=''):
 
 
 def coefficients(at, *values):
-    message = stamped(Vector3Stamped, at, values, conversions.VECTOR_FIELDS)
+    message = stamped(Vector3Stamped, at, values, messages.VECTOR_FIELDS)
     return topics.CMD_COEFFICIENTS, message
 
 
 def moment(at, frame, *torque):
-    message = stamped(WrenchStamped, at, torque, conversions.WRENCH_FIELDS[3:], frame)
+    message = stamped(WrenchStamped, at, torque, messages.WRENCH_FIELDS[3:], frame)
     return topics.CMD_MOMENT, message
 
 
 def wind(at, *values):
-    return topics.WIND, stamped(Vector3Stamped, at, values, conversions.VECTOR_FIELDS)
+    return topics.WIND, stamped(Vector3Stamped, at, values, messages.VECTOR_FIELDS)
 
 
 def ns(message):
@@ -188,26 +186,26 @@ def ns(message):
     return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
 
 
-def numbers(messages, paths):
+def numbers(received, paths):
     """Return these fields of messages, shape (messages, fields)."""
 
     def value(at, name):
         return at[int(name)] if name.isdigit() else getattr(at, name)
 
-    return np.array([[reduce(value, p.split('.'), m) for p in paths] for m in messages])
+    return np.array([[reduce(value, p.split('.'), m) for p in paths] for m in received])
 
 
-def applied(messages, paths, since=START):
+def applied(received, paths, since=START):
     """Return when commands began to act [ns after `since`], and their numbers."""
-    values = numbers(messages, paths).tolist()
-    return [(ns(m) - since, *row) for m, row in zip(messages, values, strict=True)]
+    values = numbers(received, paths).tolist()
+    return [(ns(m) - since, *row) for m, row in zip(received, values, strict=True)]
 
 
-# ---- the core ----
+# ---- the same flight by `FlightSimulator` ----
 
 
-def replayed(setup, release, count, every, changes=()):
-    """Return what the core flies: the simulator, and `count` states, one in `every` steps.
+def resimulated(setup, release, count, every, changes=()):
+    """Return a `FlightSimulator` and `count` states of its flight, one in `every` steps.
 
     `changes` are pairs of a step and a function that is called with the simulator before it.
     """
@@ -223,7 +221,7 @@ def replayed(setup, release, count, every, changes=()):
     return sim, states
 
 
-def steered(**inputs):
+def control_change(**inputs):
     """Return a change of some control inputs, in the paper's signs."""
 
     def change(sim):
@@ -232,17 +230,17 @@ def steered(**inputs):
     return change
 
 
-def blown(x, y, z):
+def wind_change(x, y, z):
     """Return a change of the mean wind, given in `map`."""
     return lambda sim: sim.set_wind(replace(sim.setup.wind, mean=(x, -y, -z)))
 
 
 def assert_flown(odometry, states):
-    """Positions, attitudes and rates are those of the core, to the last bit."""
-    found, s = numbers(odometry, conversions.ODOMETRY_FIELDS), np.array(states)
-    assert_array_equal(found[:, :3], frames.map_from_paper(s[:, :3]))
-    assert_array_equal(found[:, 3:7], frames.message_quaternion(s[:, 6:10]))
-    assert_array_equal(found[:, 10:], frames.map_from_paper(s[:, 10:13]))
+    """Positions, attitudes and rates are those of `FlightSimulator`, to the last bit."""
+    published, s = numbers(odometry, messages.ODOMETRY_FIELDS), np.array(states)
+    assert_array_equal(published[:, :3], frames.map_from_paper(s[:, :3]))
+    assert_array_equal(published[:, 3:7], frames.message_quaternion(s[:, 6:10]))
+    assert_array_equal(published[:, 10:], frames.map_from_paper(s[:, 10:13]))
     # Velocities are turned into the disc: sums of three products of at most 20 m/s.
-    velocity = Rotation.from_quat(found[:, 3:7]).apply(found[:, 7:10])
+    velocity = Rotation.from_quat(published[:, 3:7]).apply(published[:, 7:10])
     assert_allclose(velocity, frames.map_from_paper(s[:, 3:6]), rtol=0.0, atol=1e-13)

@@ -1,4 +1,4 @@
-"""sim_node in a process of its own obeys: services, parameters, time."""
+"""sim_node in its own process: services, parameters, simulated time."""
 
 import math
 import re
@@ -23,8 +23,8 @@ import yaml
 
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim.parameters import TABLE
-from ros.hearing import (
-    HELD,
+from ros.sim.sim_messages import (
+    AT_LAUNCH,
     LONG,
     PERIOD,
     SECOND,
@@ -37,8 +37,8 @@ from ros.hearing import (
     since,
     stamp,
     throw,
+    time_in,
     time_of,
-    told,
     wall,
 )
 
@@ -48,10 +48,10 @@ pytestmark = pytest.mark.ros
 # ---- pause, step, reset, throw ----
 
 
-def test_services_do_what_they_say_in_any_order(ros):
-    sim = ros.start(HELD | {'launch.height': 20.0})
-    events = ros.listen(DiagnosticStatus, 'flight_events')
-    odom = ros.listen(Odometry, 'odom', raw=True)
+def test_services_work_in_any_order(ros):
+    sim = ros.start(AT_LAUNCH | {'launch.height': 20.0})
+    events = ros.subscribe(DiagnosticStatus, 'flight_events')
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
     fly_until(ros, odom, 0)
 
     refused = ros.call(sim, 'step')
@@ -61,11 +61,11 @@ def test_services_do_what_they_say_in_any_order(ros):
     release = throw(ros, sim, 1)
     fly_until(ros, odom, release + 0.1 * SECOND)
 
-    now = told(ros.call(sim, 'pause', SetBool, data=True), 'time stands still at TIME')
-    assert told(ros.call(sim, 'pause', SetBool, data=True), 'time stands still at TIME') == now
+    now = time_in(ros.call(sim, 'pause', SetBool, data=True), 'paused at TIME')
+    assert time_in(ros.call(sim, 'pause', SetBool, data=True), 'paused at TIME') == now
     for _ in range(2):
         now += PERIOD
-        assert told(ros.call(sim, 'step'), 'now at TIME') == now
+        assert time_in(ros.call(sim, 'step'), 'stepped to TIME') == now
     fly_until(ros, odom, now)
     assert list(since(odom, release)) == list(range(0, now - release + 1, PERIOD))
 
@@ -75,7 +75,7 @@ def test_services_do_what_they_say_in_any_order(ros):
         moving = math.hypot(linear.x, linear.y, linear.z)
         return newest.pose.pose.position.z == height and moving == pytest.approx(speed)
 
-    assert throw(ros, sim, 2) == now  # also while time stands still
+    assert throw(ros, sim, 2) == now  # also while paused
     ros.spin_until(lambda: ns(odom[-1]) == now and shown(20.0, 15.0), 'the second release')
     for _ in range(2):
         assert ros.call(sim, 'reset').success
@@ -83,7 +83,7 @@ def test_services_do_what_they_say_in_any_order(ros):
     assert ns(odom[-1]) == now
 
     flights = []
-    for _ in range(2):  # after a reset the first flight comes again
+    for _ in range(2):  # a reset repeats the first flight
         release = throw(ros, sim, 1)
         landings = names(events).count('landed')
         for _ in range(2):
@@ -104,12 +104,12 @@ def test_services_do_what_they_say_in_any_order(ros):
     assert names(events) == expected
 
 
-def test_a_thrown_message_replaces_the_flight(ros):
+def test_a_throw_message_replaces_the_flight(ros):
     sim = ros.start(LONG)
-    events = ros.listen(DiagnosticStatus, 'flight_events')
-    releases = ros.listen(Odometry, 'release', qos=qos.LATCHED_QOS)
-    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
-    odom = ros.listen(Odometry, 'odom')
+    events = ros.subscribe(DiagnosticStatus, 'flight_events')
+    releases = ros.subscribe(Odometry, 'release', qos=qos.LATCHED_QOS)
+    diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
+    odom = ros.subscribe(Odometry, 'odom')
     thrower = ros.publisher(Odometry, 'throw')
     ros.spin_until(lambda: odom, 'odom')
     throw(ros, sim, 1)
@@ -121,7 +121,7 @@ def test_a_thrown_message_replaces_the_flight(ros):
     assert releases[1].twist == release_of(x=1.0).twist
     ros.spin_until(lambda: stamp(odom[-1]) > stamp(releases[1]), 'the second flight')
     at_release = [m for m in odom if m.header.stamp == releases[1].header.stamp]
-    assert [m.pose for m in at_release] == [releases[1].pose]  # announced, and at a message
+    assert [m.pose for m in at_release] == [releases[1].pose]  # published, and at a message
 
     ros.pause(sim)
     for x in (2.0, 3.0):
@@ -133,65 +133,68 @@ def test_a_thrown_message_replaces_the_flight(ros):
     later = release_of(x=4.0)
     later.header.stamp.sec = stamp(releases[2]) // SECOND + 1
     thrower.publish(later)
-    ros.pause(sim, still=False)
+    ros.resume(sim)
     ros.spin_until(lambda: len(releases) == 4, 'a fourth')
     assert releases[3].header.stamp == later.header.stamp
     ros.spin_until(lambda: names(events) == ['thrown'] * 4, 'four events')
 
 
 def test_fifty_throws_a_second_are_all_answered(ros):
-    """The messages stay evenly spaced, each throw begins at one, and the pace is kept."""
+    """Stamps stay evenly spaced, each release is at a message, and the pace is kept."""
     sim = ros.start(LONG)
-    releases = ros.listen(Odometry, 'release', qos=qos.LATCHED_QOS)
-    odom = ros.listen(Odometry, 'odom', raw=True)
+    releases = ros.subscribe(Odometry, 'release', qos=qos.LATCHED_QOS)
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
     client = ros._client(sim, 'throw', Trigger)
     ros._reach(sim)
     ros.spin_until(lambda: odom, 'odom')
-    begun, first = time.monotonic(), ns(odom[-1])
-    answers = []
-    while len(answers) < 100:
+    begin, first = time.monotonic(), ns(odom[-1])
+    responses = []
+    while len(responses) < 100:
         pending = [client.call_async(Trigger.Request()) for _ in range(5)]
         ros.spin_until(lambda: all(f.done() for f in pending), 'answers')  # noqa: B023
-        answers += [future.result() for future in pending]
-    took = time.monotonic() - begun
-    assert took < patience(2.0)
-    released = [told(a, f'flight {i}, released at TIME') for i, a in enumerate(answers, start=1)]
+        responses += [future.result() for future in pending]
+    duration = time.monotonic() - begin
+    assert duration < patience(2.0)
+    released = [
+        time_in(response, f'flight {i}, released at TIME')
+        for i, response in enumerate(responses, start=1)
+    ]
     fly_until(ros, odom, released[-1] + PERIOD)
     stamps = [ns(m) for m in odom]
     assert set(np.diff(stamps)) == {PERIOD}
     assert set(released) <= set(stamps)
-    assert released[-1] - first == pytest.approx(took * SECOND, abs=patience(0.2) * SECOND)
+    assert released[-1] - first == pytest.approx(duration * SECOND, abs=patience(0.2) * SECOND)
     assert {stamp(m) for m in releases} <= set(released)
 
 
 @pytest.mark.parametrize('slow', [{'publish_rate': 0.1}, {'real_time_factor': 1e-6}])
-def test_nobody_waits_for_a_message_that_is_due_in_minutes(ros, slow):
+def test_services_do_not_wait_for_a_message_that_is_due_in_minutes(ros, slow):
     sim = ros.start(LONG | slow)
-    odom = ros.listen(Odometry, 'odom', raw=True)
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
     ros.spin_until(lambda: ros.call(sim, 'reset').success and odom, 'odom')
-    begun = time.monotonic()
+    begin = time.monotonic()
     ros.pause(sim)
-    ros.pause(sim, still=False)
+    ros.resume(sim)
     release = throw(ros, sim, 1)
     ros.spin_until(lambda: ns(odom[-1]) == release, 'the release')
     assert ros.set(sim, {'real_time_factor': 1000.0}).successful
     fly_until(ros, odom, release + 20 * SECOND)
-    assert time.monotonic() - begun < patience(5.0)  # the message is due in 10 s at least
+    assert time.monotonic() - begin < patience(5.0)  # the message is due in 10 s or more
 
 
 # ---- parameters ----
 
 
-def answer(ros, future):
+def response_of(ros, future):
     ros.spin_until(future.done, 'an answer')
     return future.result()
 
 
 def all_values(ros, client) -> dict[str, object]:
-    """What `ros2 param dump` shows."""
-    listed = list(answer(ros, client.list_parameters()).result.names)
-    found = answer(ros, client.get_parameters(listed)).values
-    values = zip(listed, map(parameter_value_to_python, found), strict=True)
+    """Return what `ros2 param dump` shows."""
+    listed = list(response_of(ros, client.list_parameters()).result.names)
+    messages = response_of(ros, client.get_parameters(listed)).values
+    values = zip(listed, map(parameter_value_to_python, messages), strict=True)
     return {name: list(x) if hasattr(x, 'typecode') else x for name, x in values}
 
 
@@ -206,7 +209,7 @@ def test_parameters_are_listed_described_and_refused_as_a_whole(ros):
     }
     assert {name: before[name] for name in expected} == expected | LONG
 
-    described = answer(ros, client.describe_parameters([entry.name for entry in TABLE]))
+    described = response_of(ros, client.describe_parameters([entry.name for entry in TABLE]))
     for entry, shown in zip(TABLE, described.descriptors, strict=True):
         assert shown.name == entry.name
         assert entry.meaning in shown.description
@@ -237,9 +240,9 @@ def test_parameters_are_listed_described_and_refused_as_a_whole(ros):
         assert re.search(why, result.reason), result.reason
     assert all_values(ros, client) == before
 
-    # Not atomically, each is judged for itself.
+    # Not atomically, each is checked by itself.
     changes = [Parameter('launch.speed', value=20), Parameter('launch.pitch', value=181.0)]
-    results = answer(ros, client.set_parameters(changes)).results
+    results = response_of(ros, client.set_parameters(changes)).results
     assert [result.successful for result in results] == [True, False]
     assert all_values(ros, client) == before | {'launch.speed': 20.0}
     assert ros.set(sim, {'physics_rate': 300.0, 'publish_rate': 100.0}).successful
@@ -265,10 +268,10 @@ NEXT_THROW = {
 def test_changes_take_effect_when_they_should(ros):
     sim = ros.start(LONG)
     twin = ros.start(LONG, namespace='/twin')
-    winds = ros.listen(Vector3Stamped, 'applied_wind')
-    configurations = ros.listen(String, 'configuration', qos=qos.LATCHED_QOS)
-    odom = ros.listen(Odometry, 'odom', raw=True)
-    twin_odom = ros.listen(Odometry, '/twin/odom', raw=True)
+    winds = ros.subscribe(Vector3Stamped, 'applied_wind')
+    configurations = ros.subscribe(String, 'configuration', qos=qos.LATCHED_QOS)
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
+    twin_odom = ros.subscribe(Odometry, '/twin/odom', raw=True)
     fly_until(ros, odom, 0)
     fly_until(ros, twin_odom, 0)
     release, twin_release = throw(ros, sim, 1), throw(ros, twin, 1)
@@ -280,14 +283,14 @@ def test_changes_take_effect_when_they_should(ros):
     assert not winds or all(w.vector.y == 0.0 for w in winds)
     assert ros.set(sim, {'wind.y': 3.0}).successful
     ros.spin_until(lambda: any(w.vector.y == 3.0 for w in winds), 'the wind')
-    blows = stamp(winds[-1])
-    assert blows <= time_of(ros, sim)[0]
-    fly_until(ros, odom, blows + 0.2 * SECOND)
+    change = stamp(winds[-1])
+    assert change <= time_of(ros, sim)[0]
+    fly_until(ros, odom, change + 0.2 * SECOND)
     flown = since(odom, release)
     fly_until(ros, twin_odom, twin_release + max(flown))
     calm = since(twin_odom, twin_release)
-    assert all(flown[t] == calm[t] for t in flown if t <= blows - release)
-    assert all(flown[t] != calm[t] for t in flown if t > blows - release)
+    assert all(flown[t] == calm[t] for t in flown if t <= change - release)
+    assert all(flown[t] != calm[t] for t in flown if t > change - release)
 
     release = throw(ros, sim, 2)
     ros.spin_until(lambda: len(configurations) == 2, 'the configuration')
@@ -307,19 +310,19 @@ def test_changes_take_effect_when_they_should(ros):
 
     for factor in (5.0, 0.1):
         assert ros.set(sim, {'real_time_factor': factor}).successful
-        (first, begun), _, (last, ended) = (
+        (first, begin), _, (last, end) = (
             time_of(ros, sim),
             ros.spin_until(wall(0.4)),
             time_of(ros, sim),
         )
-        assert (last - first) / SECOND / (ended - begun) == pytest.approx(factor, rel=0.5)
+        assert (last - first) / SECOND / (end - begin) == pytest.approx(factor, rel=0.5)
 
 
 # ---- time ----
 
 
 def test_nodes_with_use_sim_time_follow_the_clock(ros, ros_context):
-    """Also the simulator itself may have use_sim_time, which must not make it wait for itself."""
+    """The simulator may have use_sim_time, too: it must not wait for its own clock."""
     sim = ros.start(LONG | {'publish_clock': True, 'real_time_factor': 5.0, 'use_sim_time': True})
     follower = Node(
         'follower',
@@ -331,29 +334,29 @@ def test_nodes_with_use_sim_time_follow_the_clock(ros, ros_context):
     ticks = []
     follower.create_timer(0.1, lambda: ticks.append(clock.now().nanoseconds))
     ros.spin_until(lambda: ticks, 'a tick')
-    begun, first = time.monotonic(), clock.now().nanoseconds
+    begin, first = time.monotonic(), clock.now().nanoseconds
     ros.spin_until(lambda: clock.now().nanoseconds >= first + 5 * SECOND, '5 s')
-    assert time.monotonic() - begun == pytest.approx(1.0, abs=patience(0.3))
-    assert len(ticks) == pytest.approx(50, abs=25)  # rclpy leaves out what it is late for
+    assert time.monotonic() - begin == pytest.approx(1.0, abs=patience(0.3))
+    assert len(ticks) == pytest.approx(50, abs=25)  # rclpy skips ticks that it is late for
     assert SECOND / 10 in np.diff(ticks)
 
-    now = told(ros.call(sim, 'pause', SetBool, data=True), 'time stands still at TIME')
-    ros.spin_until(lambda: clock.now().nanoseconds == now, 'the time at which it stands')
+    now = time_in(ros.call(sim, 'pause', SetBool, data=True), 'paused at TIME')
+    ros.spin_until(lambda: clock.now().nanoseconds == now, 'the time of the pause')
     count = len(ticks)
     ros.spin_until(wall(0.5))
     assert clock.now().nanoseconds == now
     assert len(ticks) - count <= 1
-    assert told(ros.call(sim, 'step'), 'now at TIME') == now + PERIOD
+    assert time_in(ros.call(sim, 'step'), 'stepped to TIME') == now + PERIOD
     ros.spin_until(lambda: clock.now().nanoseconds == now + PERIOD, 'the step')
-    ros.pause(sim, still=False)
+    ros.resume(sim)
     ros.spin_until(lambda: len(ticks) > count + 5, 'time to go on')
     ros._executor.remove_node(follower)
     follower.destroy_node()
 
 
-def test_the_clock_ticks_at_a_rate_of_its_own(ros):
-    """100 to 200 Hz of wall time, whatever the messages do, also while time stands still."""
-    heard = {}
+def test_the_clock_is_published_at_its_own_rate(ros):
+    """100 to 200 Hz of wall time, whatever the publish rate, also while paused."""
+    clocks = {}
     for name, parameters in {
         'dense': {'publish_rate': 1000.0},
         'fast': {'real_time_factor': 20.0},
@@ -366,15 +369,15 @@ def test_the_clock_ticks_at_a_rate_of_its_own(ros):
             f'/clock:=/{name}_clock',
             namespace=f'/{name}',
         )
-        heard[name] = ros.listen(Clock, f'{name}_clock', raw=True)
+        clocks[name] = ros.subscribe(Clock, f'{name}_clock', raw=True)
     ros.pause(ros.sims[-1])
-    ros.spin_until(lambda: all(heard.values()), 'the clocks')
+    ros.spin_until(lambda: all(clocks.values()), 'the clocks')
     ros.forget()
-    begun = time.monotonic()
+    begin = time.monotonic()
     ros.spin_until(wall(1.5))
-    took = time.monotonic() - begun
-    rates = {name: len(ticks) / took for name, ticks in heard.items()}
+    duration = time.monotonic() - begin
+    rates = {name: len(ticks) / duration for name, ticks in clocks.items()}
     assert all(40 < rate < 215 for rate in rates.values()), rates
-    for name, ticks in heard.items():
+    for name, ticks in clocks.items():
         stamps = [ns(cdr) for cdr in ticks]
         assert (len(set(stamps)) == 1) if name == 'usual' else (min(np.diff(stamps)) > 0)

@@ -1,4 +1,4 @@
-"""sim_node as a process: how it begins, ends, keeps up, and whom it serves."""
+"""sim_node as a process: start, end, pace, and what it publishes to which subscribers."""
 
 from collections import Counter
 import math
@@ -29,7 +29,7 @@ import yaml
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.messages import Quantities
 from disc_sim_ros.ros.sim.node import SimNode
-from ros.hearing import (
+from ros.sim.sim_messages import (
     LONG,
     PERIOD,
     SECOND,
@@ -46,10 +46,10 @@ from ros.sim_process import DEADLINE
 pytestmark = pytest.mark.ros
 
 
-# ---- beginning and ending ----
+# ---- start and end ----
 
 
-WRONG = {  # arguments, what the one line says
+WRONG = {  # arguments, a pattern of the error line
     ('-p', 'launch.sped:=3.0'): 'launch.sped: 3 .* did you mean launch.speed',
     ('-p', 'launch.speed:=fast'): "launch.speed: 'fast' .* number",
     ('-p', 'qos_overrides./odom.publisher.dept:=5'): 'qos_overrides./odom.publisher.dept',
@@ -68,54 +68,54 @@ FILES = {
 def test_wrong_arguments_end_it_with_one_line_before_it_publishes(ros, tmp_path):
     for name, values in FILES.items():
         (tmp_path / name).write_text(yaml.safe_dump({'/**': {'ros__parameters': values}}))
-    heard = ros.listen(Odometry, 'odom'), ros.listen(DiagnosticArray, '/diagnostics')
+    published = ros.subscribe(Odometry, 'odom'), ros.subscribe(DiagnosticArray, '/diagnostics')
     waiting = list(WRONG.items())
     running: dict[subprocess.Popen, str] = {}
     while waiting or running:
         while waiting and len(running) < 3:
-            arguments, why = waiting.pop()
-            command = [sys.executable, '-m', 'disc_sim_ros.ros.sim.node', '--ros-args']
+            arguments, pattern = waiting.pop()
+            command = [sys.executable, '-m', 'disc_sim_ros.ros.sim', '--ros-args']
             process = subprocess.Popen(
                 [*command, *arguments], cwd=tmp_path, stderr=subprocess.PIPE, text=True
             )
-            running[process] = why
+            running[process] = pattern
         ros.spin_until(lambda: any(p.poll() is not None for p in running), 'an end')
         for process in [p for p in running if p.poll() is not None]:
-            error, why = process.stderr.read(), running.pop(process)
+            error, pattern = process.stderr.read(), running.pop(process)
             process.stderr.close()
-            assert re.fullmatch(f'sim_node: error: .*{why}.*\n', error), error
+            assert re.fullmatch(f'sim_node: error: .*{pattern}.*\n', error), error
             assert process.returncode == 2, error
-    assert not any(heard)
+    assert not any(published)
 
 
 def catches_sigterm(pid: int) -> bool:
-    """Say whether a process has a handler of its own for SIGTERM."""
+    """Return True if a process has a handler of its own for SIGTERM."""
     caught = re.search(r'SigCgt:\s+([0-9a-f]+)', Path(f'/proc/{pid}/status').read_text())
     return bool(int(caught[1], 16) >> (signal.SIGTERM - 1) & 1)
 
 
 def test_a_signal_ends_it_quietly_whatever_it_does(ros):
-    """In flight, twice, while time stands still, with a service call pending."""
-    states = {'/flying': {}, '/twice': {}, '/paused': {}, '/asked': {'real_time_factor': 0.001}}
+    """In flight, twice, while paused, with a service call pending."""
+    states = {'/flying': {}, '/twice': {}, '/paused': {}, '/called': {'real_time_factor': 0.001}}
     sims = {space: ros.start(LONG | more, namespace=space) for space, more in states.items()}
     for sim in sims.values():
         throw(ros, sim, 1)
     ros.pause(sims['/paused'])
-    ros._client(sims['/asked'], 'throw', Trigger).call_async(Trigger.Request())
+    ros._client(sims['/called'], 'throw', Trigger).call_async(Trigger.Request())
     signals = {
         '/flying': [signal.SIGINT],
         '/twice': [signal.SIGINT, signal.SIGTERM, signal.SIGINT],
         '/paused': [signal.SIGTERM],
-        '/asked': [signal.SIGTERM],
+        '/called': [signal.SIGTERM],
     }
-    begun = time.monotonic()
+    begin = time.monotonic()
     for space, sim in sims.items():
         for number in signals[space]:
             sim.process.send_signal(number)
     for space, sim in sims.items():
         assert sim.wait() == 0, f'{space} {sim.stderr}'
         assert not re.search('Traceback|[Ee]rror', sim.stderr), f'{space} {sim.stderr}'
-    assert time.monotonic() - begun < patience(2.0)
+    assert time.monotonic() - begin < patience(2.0)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -134,25 +134,25 @@ def test_a_signal_ends_it_quietly_while_it_starts(ros_environment, tmp_path, num
     while not ready():
         assert time.monotonic() < end
         assert process.poll() is None
-    begun = time.monotonic()
+    begin = time.monotonic()
     process.send_signal(number)
     process.send_signal(number)
     assert process.wait(DEADLINE) == 0
-    assert time.monotonic() - begun < patience(2.0)
+    assert time.monotonic() - begin < patience(2.0)
     assert 'Traceback' not in stderr.read_text()
 
 
-# ---- keeping up ----
+# ---- pace ----
 
 
-def test_diagnostics_tell_once_a_second_how_it_keeps_up(ros):
+def test_diagnostics_report_once_a_second_how_it_keeps_pace(ros):
     sim = ros.start(LONG)
-    arrays = ros.listen(DiagnosticArray, '/diagnostics')
+    arrays = ros.subscribe(DiagnosticArray, '/diagnostics')
     arrived = []
     ros.node.create_subscription(
         DiagnosticArray, '/diagnostics', lambda _: arrived.append(time.monotonic()), 10
     )
-    odom = ros.listen(Odometry, 'odom', raw=True)
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
     fly_until(ros, odom, 0)
     throw(ros, sim, 1)
     ros.spin_until(lambda: len(arrived) >= 3, 'three times')
@@ -167,15 +167,15 @@ def test_diagnostics_tell_once_a_second_how_it_keeps_up(ros):
     assert status.hardware_id == 'disc'
 
     def stall(seconds: float) -> tuple[float, dict[str, str]]:
-        """Stop the process; return for how long, and what /diagnostics says afterwards."""
-        begun = time.monotonic()
+        """Stop the process; return for how long [s], and the values of /diagnostics afterwards."""
+        begin = time.monotonic()
         sim.process.send_signal(signal.SIGSTOP)
         ros.spin_until(wall(seconds))
         sim.process.send_signal(signal.SIGCONT)
-        took = time.monotonic() - begun
+        duration = time.monotonic() - begin
         count, worst = len(arrays), []
 
-        def told_since() -> bool:
+        def reported_twice() -> bool:
             worst.extend(
                 float(p.value)
                 for a in arrays[count + len(worst) :]
@@ -184,18 +184,18 @@ def test_diagnostics_tell_once_a_second_how_it_keeps_up(ros):
             )
             return len(worst) >= 2
 
-        ros.spin_until(told_since, 'diagnostics')
-        return took, diagnostics_of(arrays) | {'worst': max(worst)}
+        ros.spin_until(reported_twice, 'diagnostics')
+        return duration, diagnostics_of(arrays) | {'worst': max(worst)}
 
     slips = int(values['slips'])
-    took, values = stall(0.5)
+    duration, values = stall(0.5)
     assert int(values['slips']) > slips
-    assert float(values['slipped_s']) >= took - 0.1 - 0.05
-    assert values['worst'] >= took - 0.05
-    assert 'fallen' in sim.stderr
+    assert float(values['slipped_s']) >= duration - 0.1 - 0.05
+    assert values['worst'] >= duration - 0.05
+    assert 'behind the wall clock' in sim.stderr
     for _ in range(10):  # a busy machine makes a short stall a long one
         slips = values['slips']
-        took, values = stall(0.05)
+        duration, values = stall(0.05)
         if values['worst'] < 0.1:
             break
     assert values['worst'] >= 0.04
@@ -204,16 +204,16 @@ def test_diagnostics_tell_once_a_second_how_it_keeps_up(ros):
     assert set(np.diff([ns(m) for m in odom])) == {PERIOD}
 
 
-# ---- who listens ----
+# ---- subscribers ----
 
 
-def test_what_nobody_hears_is_neither_made_nor_sent(ros, ros_context):
-    """The node in this process, its channels counted."""
+def test_messages_without_subscribers_are_neither_built_nor_published(ros, ros_context):
+    """The node runs in this process, and its publishers are counted."""
     sim = SimNode(
         context=ros_context,
         parameter_overrides=[Parameter(name, value=x) for name, x in LONG.items()],
     )
-    out = sim.loop._outputs
+    out = sim.loop._publishers
     motion = {
         'odom': (Odometry, out.odom),
         'pose': (PoseStamped, out.pose),
@@ -222,49 +222,49 @@ def test_what_nobody_hears_is_neither_made_nor_sent(ros, ros_context):
         'aero_wrench': (WrenchStamped, out.aero_wrench),
         'path': (PathMessage, out.path),
         **{
-            name: (Float64, channel)
-            for name, channel in zip(Quantities._fields, out.quantities, strict=True)
+            name: (Float64, sink)
+            for name, sink in zip(Quantities._fields, out.quantities, strict=True)
         },
     }
-    sent = Counter()
-    for name, (_, channel) in motion.items():
+    published = Counter()
+    for name, (_, sink) in motion.items():
 
-        def count(data, name=name, publish=channel._publish):
-            sent[name] += 1
+        def count(data, name=name, publish=sink._publish):
+            published[name] += 1
             publish(data)
 
-        channel._publish = count
+        sink._publish = count
     ros._executor.add_node(sim)
     sim.start()
     try:
         sim.loop.submit(sim.loop.throw).result(DEADLINE)
-        ros.spin_until(lambda: sim.loop.timeline.now > SECOND / 2, 'half a second')
-        assert not sent
-        for name, (kind, channel) in motion.items():
-            sent.clear()
-            heard = []
-            subscription = ros.node.create_subscription(kind, name, heard.append, 10)
-            ros.spin_until(lambda heard=heard: len(heard) > 1, name)
-            assert set(sent) == {name}
+        ros.spin_until(lambda: sim.loop.clock.now > SECOND / 2, 'half a second')
+        assert not published
+        for name, (message_type, sink) in motion.items():
+            published.clear()
+            received = []
+            subscription = ros.node.create_subscription(message_type, name, received.append, 10)
+            ros.spin_until(lambda received=received: len(received) > 1, name)
+            assert set(published) == {name}
             ros.node.destroy_subscription(subscription)
-            ros.spin_until(lambda channel=channel: not channel.heard, f'nobody hears {name}')
+            ros.spin_until(lambda sink=sink: not sink.has_subscribers, f'the end of {name}')
     finally:
         sim.stop()
         ros._executor.remove_node(sim)
         sim.destroy_node()
 
 
-def test_who_comes_late_sees_the_disc_and_its_path(ros):
+def test_a_late_subscriber_gets_the_disc_and_its_path(ros):
     sim = ros.start(LONG | {'auto_throw': True, 'real_time_factor': 5.0})
-    odom = ros.listen(Odometry, 'odom')
+    odom = ros.subscribe(Odometry, 'odom')
     ros.spin_until(lambda: len(odom) > 100, 'odom')
     latched = {
-        kind: ros.listen(kind, name, qos=qos.LATCHED_QOS)
-        for name, kind in (('configuration', String), ('markers', MarkerArray))
+        message_type: ros.subscribe(message_type, name, qos=qos.LATCHED_QOS)
+        for name, message_type in (('configuration', String), ('markers', MarkerArray))
     }
-    releases = ros.listen(Odometry, 'release', qos=qos.LATCHED_QOS)
-    paths = ros.listen(PathMessage, 'path')
-    transforms = ros.listen(TransformStamped, 'transform')
+    releases = ros.subscribe(Odometry, 'release', qos=qos.LATCHED_QOS)
+    paths = ros.subscribe(PathMessage, 'path')
+    transforms = ros.subscribe(TransformStamped, 'transform')
     ros.spin_until(
         lambda: releases and all(latched.values()) and len(paths) > 3 and len(transforms) > 8,
         'all of them',

@@ -1,4 +1,4 @@
-"""The bag of `fly` has what sim_node publishes, and the flight that `fly` computes."""
+"""The bag of `fly` has the messages of sim_node and the flight that `fly` computes."""
 
 from dataclasses import replace
 from functools import cache
@@ -25,6 +25,7 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.frames import odometry_array
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros.qos import discovered_qos
 from disc_sim_ros.ros.sim import offline_bag
 from disc_sim_ros.ros.sim.config import configuration
 
@@ -67,7 +68,7 @@ PACKED = {
         Float64,
     ),
 }
-WHOLE = {  # serialised by ROS, with whatever is in its padding
+SERIALISED = {  # by ROS, with arbitrary bytes in the padding
     topics.PATH: Path,
     topics.MARKERS: MarkerArray,
     topics.FIELD_MARKERS: MarkerArray,
@@ -82,8 +83,8 @@ def config(**changes):
 
 
 def steered(ros, sim):
-    """Command what acts from the release on, and wait until it does."""
-    applied = ros.listen(Vector3Stamped, topics.APPLIED_COEFFICIENTS)
+    """Command control coefficients before the release, and wait until they act."""
+    applied = ros.subscribe(Vector3Stamped, topics.APPLIED_COEFFICIENTS)
     message = Vector3Stamped()
     message.vector.x, message.vector.y, message.vector.z = CONTROL[:3]
     ros.send(sim, ros.publisher(Vector3Stamped, topics.CMD_COEFFICIENTS), message)
@@ -91,18 +92,21 @@ def steered(ros, sim):
 
 
 def test_messages_and_topics_are_those_of_sim_node(ros, tmp_path):
-    still = {'auto_throw': False, 'real_time_factor': 0.0, 'start_time': START / SECOND}
-    sim = ros.start(PARAMETERS | still | {'command_timeout': 3600.0})
-    heard = {name: ros.listen(kind, name, raw=True) for name, kind in (PACKED | WHOLE).items()}
-    odom = heard[topics.ODOM]
+    paused = {'auto_throw': False, 'real_time_factor': 0.0, 'start_time': START / SECOND}
+    sim = ros.start(PARAMETERS | paused | {'command_timeout': 3600.0})
+    live = {
+        name: ros.subscribe(message_type, name, raw=True)
+        for name, message_type in (PACKED | SERIALISED).items()
+    }
+    odom = live[topics.ODOM]
     ros.pause(sim)
     ros.spin_until(lambda: ros.call(sim, 'reset').success and odom, 'odom')
     steered(ros, sim)
     ros.forget()
     assert ros.call(sim, 'throw').success
-    ros.spin_until(lambda: heard[topics.CONFIGURATION], 'the throw')
-    ros.pause(sim, still=False)
-    release = deserialize_message(heard[topics.RELEASE][0], Odometry).header.stamp
+    ros.spin_until(lambda: live[topics.CONFIGURATION], 'the throw')
+    ros.resume(sim)
+    release = deserialize_message(live[topics.RELEASE][0], Odometry).header.stamp
     start = release.sec * SECOND + release.nanosec
     file = tmp_path / 'flight'
     offline_bag.write_flight(
@@ -111,21 +115,24 @@ def test_messages_and_topics_are_those_of_sim_node(ros, tmp_path):
 
     bag = open_bag(file)
     assert bag.complete
-    written = {f'/{name}': [] for name in heard}
+    written = {f'/{name}': [] for name in live}
     for message in bag.raw():
         assert start <= message.log_time == message.publish_time
         written[message.topic].append(message.data)
     ros.spin_until(
-        lambda: all(len(heard[name[1:]]) >= len(all_) for name, all_ in written.items()),
-        'all that the bag has',
+        lambda: all(len(live[name[1:]]) >= len(data) for name, data in written.items()),
+        'as many messages as in the bag',
     )
     assert len(written['/odom']) > 150
     assert len(written['/flight_events']) == 2
     for name in PACKED:
-        assert heard[name] == written[f'/{name}'], name
-    for name, kind in WHOLE.items():
-        live = [deserialize_message(data, kind) for data in heard[name]]
-        assert live == [deserialize_message(data, kind) for data in written[f'/{name}']], name
+        assert live[name] == written[f'/{name}'], name
+    for name, message_type in SERIALISED.items():
+        from_node, from_bag = (
+            [deserialize_message(data, message_type) for data in messages]
+            for messages in (live[name], written[f'/{name}'])
+        )
+        assert from_node == from_bag, name
 
     published = {
         name
@@ -134,10 +141,10 @@ def test_messages_and_topics_are_those_of_sim_node(ros, tmp_path):
     }
     assert {info.topic.name for info in bag.topics} == published
     for info in bag.topics:
-        (found,) = ros.node.get_publishers_info_by_topic(info.topic.name)
-        assert info.topic.type == found.topic_type
-        assert info.topic.type_hash == str(found.topic_type_hash)
-        assert info.topic.qos == (offline_bag.discovered(found.qos_profile),)
+        (publisher,) = ros.node.get_publishers_info_by_topic(info.topic.name)
+        assert info.topic.type == publisher.topic_type
+        assert info.topic.type_hash == str(publisher.topic_type_hash)
+        assert info.topic.qos == (discovered_qos(publisher.qos_profile),)
         assert info.topic.definition.strip()
 
 

@@ -1,4 +1,4 @@
-"""recorder_node as processes: what was published is in the bag, whatever happens."""
+"""recorder_node in its own process: the bag holds what was published, whatever happens."""
 
 from contextlib import contextmanager
 import os
@@ -30,25 +30,24 @@ from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros
 
-NOT_POLLED = 'from disc_sim_ros.ros import internals; internals.can_be_polled = lambda _: False'
 LATE_GRAPH = """
 import time
 from rclpy.node import Node
 
 def late(method):
-    '''Have the graph tell of publishers 0.3 s after it was first asked for them.'''
-    shown = {}  # by topic: the answer, how many newer ones tell of, since when
+    '''Let the graph report a change of publishers 0.3 s late.'''
+    reported = {}  # by topic: the answer, the newer number of publishers, since when
 
-    def told(self, name):
+    def answer_late(self, name):
         now, answer = time.monotonic(), method(self, name)
         count = answer if isinstance(answer, int) else len(answer)
-        old, newer, since = shown.setdefault(name, (answer, count, now))
+        old, newer, since = reported.setdefault(name, (answer, count, now))
         if count != newer:
             newer, since = count, now
-        shown[name] = (answer if now - since > 0.3 else old, newer, since)
-        return shown[name][0]
+        reported[name] = (answer if now - since > 0.3 else old, newer, since)
+        return reported[name][0]
 
-    return told
+    return answer_late
 
 for name in ('count_publishers', 'get_publishers_info_by_topic'):
     setattr(Node, name, late(getattr(Node, name)))
@@ -65,7 +64,7 @@ SECOND = 10**9  # ns
 
 @pytest.fixture
 def record(ros, tmp_path):
-    """A function that starts a recorder; what still runs at the end is killed."""
+    """A function that starts a recorder; those that still run at the end are killed."""
     started = []
 
     def start(bag=None, before='', **parameters) -> Recorder:
@@ -82,57 +81,57 @@ def record(ros, tmp_path):
 def call(ros, service: str) -> str:
     client = ros.node.create_client(Trigger, f'recorder_node/{service}')
     ros.spin_until(client.service_is_ready, service)
-    # A server drops its answer to a client that it has not found yet: ask until there is one.
-    answers = []
+    # A service drops its response to a client that is not matched yet: call until there is one.
+    futures = []
 
     def answered() -> bool:
-        answers.append(client.call_async(Trigger.Request()))
+        futures.append(client.call_async(Trigger.Request()))
         end = time.monotonic() + 0.5
-        while not any(a.done() for a in answers) and time.monotonic() < end:
+        while not any(f.done() for f in futures) and time.monotonic() < end:
             ros._executor.spin_once(0.02)
-        return any(a.done() for a in answers)
+        return any(f.done() for f in futures)
 
     ros.spin_until(answered, f'an answer of {service}')
-    answer = next(a for a in answers if a.done()).result()
-    assert answer.success, answer.message
-    return answer.message
+    response = next(f for f in futures if f.done()).result()
+    assert response.success, response.message
+    return response.message
 
 
 def cut(messages, ends):
-    """Messages from the first to the last of those that are in `ends`."""
+    """Return the messages from the first to the last of those that are in `ends`."""
     places = [n for n, message in enumerate(messages) if message in ends]
     return messages[places[0] : places[-1] + 1]
 
 
-def test_the_bag_holds_the_bytes_of_a_flight_and_what_the_graph_says(ros, record):
+def test_the_bag_holds_the_bytes_of_a_flight_and_describes_its_topics(ros, record):
     recorder = record()
     ros.start({'auto_throw': False})
-    odometry = ros.listen(Odometry, topics.ODOM, raw=True)
-    configuration = ros.listen(String, topics.CONFIGURATION, raw=True, qos=LATCHED)
-    recorder.listens_to('/odom', '/configuration', '/flight_events', '/release')
+    odometry = ros.subscribe(Odometry, topics.ODOM, raw=True)
+    configuration = ros.subscribe(String, topics.CONFIGURATION, raw=True, qos=LATCHED)
+    recorder.wait_for_topics('/odom', '/configuration', '/flight_events', '/release')
     ros.spin_until(lambda: odometry, 'odometry')
     sim = ros.sims[0]
-    begun = len(odometry)
+    before = len(odometry)
     assert ros.call(sim, 'throw').success
     ros.spin_until(lambda: configuration, 'the configuration')
-    ros.spin_until(lambda: len(odometry) > begun + 400, 'two seconds')
+    ros.spin_until(lambda: len(odometry) > before + 400, 'two seconds')
     graph = {
         name: ros.node.get_publishers_info_by_topic(name) for name in ('/odom', '/configuration')
     }
     assert recorder.end() == 0
-    assert 'nothing lost' in recorder.said
+    assert 'nothing lost' in recorder.log
 
     bag = open_bag(recorder.bag)
     assert bag.complete
     recorded = [m.data for m in bag.raw(['/odom'])]
-    # One of the two has heard the simulator first, and one last: between, they are the same.
+    # Recorder and test start and end at different times: in between, they are the same.
     common = set(recorded) & set(odometry)
     assert len(common) > 300
     assert cut(recorded, common) == cut(odometry, common)
     assert [m.data for m in bag.raw(['/configuration'])] == configuration
     for info in bag.topics:
         if info.topic.name in graph:
-            expected = qos.topic_of(info.topic.name, info.topic.type, graph[info.topic.name])
+            expected = qos.bag_topic(info.topic.name, info.topic.type, graph[info.topic.name])
             assert expected.definition
             assert expected.type_hash.startswith('RIHS01_')
             assert info.topic == expected
@@ -140,14 +139,14 @@ def test_the_bag_holds_the_bytes_of_a_flight_and_what_the_graph_says(ros, record
     assert all(0 <= log - sent < SECOND for sent, log in times)
 
 
-def test_what_is_latched_and_who_comes_later_are_recorded(ros, record):
+def test_latched_messages_and_later_publishers_are_recorded(ros, record):
     latched = ros.node.create_publisher(Int64, 'latched', LATCHED)
     latched.publish(Int64(data=7))
     recorder = record()
-    recorder.listens_to('/latched')
+    recorder.wait_for_topics('/latched')
     late = Counter(ros, 'late')
-    recorder.listens_to('/late')
-    late.heard_by(1)
+    recorder.wait_for_topics('/late')
+    late.wait_for_subscriptions(1)
     late.publish(100)
     assert recorder.end(signal.SIGTERM) == 0
     assert counts(recorder.bag, '/latched') == [7]
@@ -155,23 +154,25 @@ def test_what_is_latched_and_who_comes_later_are_recorded(ros, record):
     names = {info.topic.name for info in open_bag(recorder.bag).topics}
     assert '/rosout' in names  # of the harness
     assert '/diagnostics' not in names  # of the recorder alone
-    last = recorder.said.splitlines()[-1]
+    last = recorder.log.splitlines()[-1]
     assert last.startswith('recorder_node: recorded ')
     assert f'nothing lost, in {recorder.bag} (open it with analyse_bag' in last
 
 
 @pytest.mark.parametrize('before', ['', LATE_GRAPH], ids=['', 'late graph'])
-def test_what_is_latched_is_recorded_once_whoever_leaves(ros, record, before):
+def test_a_latched_message_is_recorded_once_if_another_publisher_leaves(ros, record, before):
     latched = ros.node.create_publisher(Int64, 'latched', LATCHED)
-    less = ros.node.create_publisher(Int64, 'latched', LATCHED_BEST_EFFORT)
+    best_effort = ros.node.create_publisher(Int64, 'latched', LATCHED_BEST_EFFORT)
     recorder = record(before=before)
-    recorder.listens_to('/latched')
-    both = latched, less
-    one = [1, 1]  # once it knows of both
-    ros.spin_until(lambda: [p.get_subscription_count() for p in both] == one, 'a subscription')
+    recorder.wait_for_topics('/latched')
+    both = latched, best_effort
+    counts_expected = [1, 1]  # once it has discovered both
+    ros.spin_until(
+        lambda: [p.get_subscription_count() for p in both] == counts_expected, 'a subscription'
+    )
     latched.publish(Int64(data=7))
-    time.sleep(0.2)  # for the first subscription to hear it, as well as it can
-    ros.node.destroy_publisher(less)  # a reliable subscription follows, and gets the 7 again
+    time.sleep(0.2)  # for the first subscription to get it, best effort
+    ros.node.destroy_publisher(best_effort)  # a reliable subscription follows, and gets it again
     ros.spin_until(lambda: latched.get_subscription_count() == 2, 'the second subscription')
     ros.spin_until(lambda: latched.get_subscription_count() == 1, 'the end of the first')
     assert recorder.end() == 0
@@ -179,21 +180,20 @@ def test_what_is_latched_is_recorded_once_whoever_leaves(ros, record, before):
 
 
 def test_a_second_publisher_that_offers_less_is_recorded_without_gap_or_repetition(ros, record):
-    sure = Counter(ros, 'both')
+    reliable = Counter(ros, 'both')
     recorder = record()
-    recorder.listens_to('/both')
-    sure.heard_by(1)
-    sure.publish(200)
-    unsure = Counter(ros, 'both', BEST_EFFORT)
-    unsure.heard_by(1)
-    for _ in range(1500):  # past the second in which two subscriptions hear
-        sure.publish_one()
-        unsure.publish_one()
+    recorder.wait_for_topics('/both')
+    reliable.wait_for_subscriptions(1)
+    reliable.publish(200)
+    best_effort = Counter(ros, 'both', BEST_EFFORT)
+    best_effort.wait_for_subscriptions(1)
+    for _ in range(1500):  # longer than the second in which two subscriptions overlap
+        reliable.publish_one()
+        best_effort.publish_one()
         time.sleep(0.001)
     assert recorder.end() == 0
-    found = counts(recorder.bag, '/both')
     expected = sorted([*range(1700), *range(1500)])
-    assert sorted(found) == expected
+    assert sorted(counts(recorder.bag, '/both')) == expected
     (info,) = (i for i in open_bag(recorder.bag).topics if i.topic.name == '/both')
     assert {q.reliability for q in info.topic.qos} == {'reliable', 'best_effort'}
 
@@ -202,85 +202,85 @@ def test_a_killed_recorder_costs_at_most_the_last_second(ros, record, tmp_path):
     recorders = [record() for _ in range(3)]
     counter = Counter(ros, 'count')
     for recorder in recorders:
-        recorder.listens_to('/count')
-    counter.heard_by(3)
-    killed = []
+        recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(3)
+    kill_times = []
     for recorder in recorders:
         counter.publish(570, rate=1000.0)
         recorder.process.kill()
-        killed.append(time.monotonic())
-    for recorder, moment in zip(recorders, killed, strict=True):
+        kill_times.append(time.monotonic())
+    for recorder, kill_time in zip(recorders, kill_times, strict=True):
         recorder.wait()
-        found = counts(recorder.bag, '/count')
-        assert found == list(range(len(found)))
-        assert len(found) >= sum(sent < moment - 1.0 for sent in counter.sent)
+        recorded = counts(recorder.bag, '/count')
+        assert recorded == list(range(len(recorded)))
+        assert len(recorded) >= sum(sent < kill_time - 1.0 for sent in counter.sent)
         bag = open_bag(recorder.bag)
         assert not bag.complete
-        whole = tmp_path / f'{recorder.bag.name}_whole'
-        repair(recorder.bag, whole)
-        assert open_bag(whole).complete
-        assert counts(whole, '/count') == found
+        repaired = tmp_path / f'{recorder.bag.name}_repaired'
+        repair(recorder.bag, repaired)
+        assert open_bag(repaired).complete
+        assert counts(repaired, '/count') == recorded
 
 
-def test_what_is_missing_is_counted_in_the_log_and_in_the_bag(ros, record):
+def test_lost_messages_are_counted_in_the_log_and_in_the_bag(ros, record):
     counter = Counter(ros, 'count', QoSProfile(depth=10))
     recorder = record()
-    recorder.listens_to('/count')
-    counter.heard_by(1)
+    recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(1)
     counter.publish(10)
     message = call(ros, 'flush')
     assert message.endswith('are on the disk')
     recorder.process.send_signal(signal.SIGSTOP)
-    counter.publish(5000, rate=1e5)  # more than the network holds for who does not listen
+    counter.publish(5000, rate=1e5)  # more than the network holds for a stopped subscriber
     recorder.process.send_signal(signal.SIGCONT)
     counter.publish(100, rate=1000.0)
     assert recorder.end() == 0
-    found = counts(recorder.bag, '/count')
-    assert found == sorted(set(found))
-    assert (found[0], found[-1]) == (0, 5109)
-    missing = 5110 - len(found)
+    recorded = counts(recorder.bag, '/count')
+    assert recorded == sorted(set(recorded))
+    assert (recorded[0], recorded[-1]) == (0, 5109)
+    missing = 5110 - len(recorded)
     assert missing > 0
     assert open_bag(recorder.bag).custom_data['gaps /count'] == str(missing)
-    assert f'gaps /count: {missing}' in recorder.said.splitlines()[-1]
+    assert f'gaps /count: {missing}' in recorder.log.splitlines()[-1]
 
 
-def test_topics_that_cannot_be_recorded_do_not_keep_others_from_it(ros, record):
-    """One type is not installed there, one clashes with a publisher of the recorder itself."""
+def test_topics_that_cannot_be_recorded_do_not_affect_others(ros, record):
+    """One has a type that is not installed, one clashes with a publisher of the recorder."""
     unknown = ros.node.create_publisher(JointState, 'unknown', 10)
     clashing = ros.node.create_publisher(String, 'diagnostics', 10)
     double = ros.node.create_publisher(Int64, 'double', 10)
-    elsewhere = Context()  # within one, ROS refuses a second type
-    elsewhere.init()
-    other = Node('other', context=elsewhere)
+    other_context = Context()  # in one context, ROS refuses a second type
+    other_context.init()
+    other = Node('other', context=other_context)
     double_too = other.create_publisher(String, 'double', 10)
     recorder = record(before="sys.modules['sensor_msgs'] = sys.modules['sensor_msgs.msg'] = None")
     counter = Counter(ros, 'count')
-    recorder.listens_to('/count', '/double')
-    counter.heard_by(1)
+    recorder.wait_for_topics('/count', '/double')
+    counter.wait_for_subscriptions(1)
     counter.publish(100)
-    recorder.wait_for('/unknown is not recorded: no type sensor_msgs/msg/JointState here')
-    recorder.wait_for('/diagnostics is not recorded: ')
-    recorder.wait_for('/double has several types, std_msgs/msg/Int64, std_msgs/msg/String')
+    recorder.wait_for_log('/unknown is not recorded: no type sensor_msgs/msg/JointState here')
+    recorder.wait_for_log('/diagnostics is not recorded: ')
+    recorder.wait_for_log('/double has several types, std_msgs/msg/Int64, std_msgs/msg/String')
     assert recorder.end() == 0
     assert counts(recorder.bag, '/count') == list(range(100))
-    assert recorder.said.count('/unknown is not') == 1
-    assert 'Traceback' not in recorder.said
-    assert all(p.topic_name for p in (unknown, clashing, double, double_too))  # till now
-    elsewhere.shutdown()
+    assert recorder.log.count('/unknown is not') == 1
+    assert 'Traceback' not in recorder.log
+    assert all(p.topic_name for p in (unknown, clashing, double, double_too))  # alive until now
+    other_context.shutdown()
 
 
 def test_pause_resume_and_split(ros, record):
     latched = [ros.node.create_publisher(Int64, 'latched', LATCHED) for _ in range(2)]
     counter = Counter(ros, 'count')
     recorder = record(start_paused=True)
-    recorder.listens_to('/count', '/latched')
-    counter.heard_by(1)
+    recorder.wait_for_topics('/count', '/latched')
+    counter.wait_for_subscriptions(1)
     for publisher in latched:
         ros.spin_until(publisher.get_subscription_count, 'the recorder')
     for n in range(4):
         latched[n % 2].publish(Int64(data=n))
     counter.publish(50)
-    status = ros.listen(DiagnosticArray, topics.DIAGNOSTICS)
+    status = ros.subscribe(DiagnosticArray, topics.DIAGNOSTICS)
     ros.spin_until(lambda: [s for s in status if s.status[0].message == 'paused'], 'diagnostics')
     assert 'recording' in call(ros, 'resume')
     counter.publish(500)
@@ -290,92 +290,92 @@ def test_pause_resume_and_split(ros, record):
     counter.publish(50)
     status.clear()
     ros.spin_until(lambda: status, 'diagnostics')
-    (said,) = status[-1].status
-    values = {v.key: v.value for v in said.values}
-    assert values['bag'] == said.hardware_id == str(recorder.bag)
+    (newest,) = status[-1].status
+    values = {v.key: v.value for v in newest.values}
+    assert values['bag'] == newest.hardware_id == str(recorder.bag)
     assert int(values['messages']) >= 1001
     assert int(values['bytes']) > 0
     assert 0.0 <= float(values['worst_lateness_s']) < DEADLINE
     assert int(values['free_bytes']) > 0
     assert recorder.end() == 0
-    found = counts(recorder.bag, '/count')
-    assert found == list(range(found[0], found[-1] + 1))
-    assert (found[0], found[-1]) == (50, 1049)
+    recorded = counts(recorder.bag, '/count')
+    assert recorded == list(range(recorded[0], recorded[-1] + 1))
+    assert (recorded[0], recorded[-1]) == (50, 1049)
     assert sorted(counts(recorder.bag, '/latched')) == [2, 3]  # the last of each publisher
     bag = open_bag(recorder.bag)
     assert [path.name for path in bag.files] == ['bag_0_0.mcap', 'bag_0_1.mcap']
     assert sum(len(counts(path, '/count')) for path in bag.files) == 1000
 
 
-def test_stamps_follow_the_time_of_the_simulation(ros, record):
+def test_log_times_follow_simulated_time(ros, record):
     counter = Counter(ros, 'count')
     clock = ros.node.create_publisher(Clock, '/clock', 10)
     recorder = record(use_sim_time=True, topics='/count /diagnostics')
     early = record(use_sim_time=True, topics='/count')
     for one in (recorder, early):
-        one.listens_to('/count')
-    counter.heard_by(2)
-    counter.publish(10)  # before anybody knows the time
-    early.wait_for('no /clock has come')
+        one.wait_for_topics('/count')
+    counter.wait_for_subscriptions(2)
+    counter.publish(10)  # before the first /clock
+    early.wait_for_log('no /clock has come')
     assert early.end() == 0
-    assert 'log times of 10 messages' in early.said
-    arrived = [m.log_time - m.publish_time for m in open_bag(early.bag).raw(['/count'])]
-    assert len(arrived) == 10
-    assert all(0 <= late < DEADLINE * SECOND for late in arrived)
+    assert 'log times of 10 messages' in early.log
+    delays = [m.log_time - m.publish_time for m in open_bag(early.bag).raw(['/count'])]
+    assert len(delays) == 10
+    assert all(0 <= delay < DEADLINE * SECOND for delay in delays)
     ros.spin_until(clock.get_subscription_count, 'its clock')
     tick = Clock()
     tick.clock.sec = 100
     clock.publish(tick)
     end = time.monotonic() + 10.0
 
-    def time_has_come() -> bool:
+    def has_recorded_waiting() -> bool:
         call(ros, 'flush')
         return len(counts(recorder.bag, '/count')) >= 10
 
-    while not time_has_come():
+    while not has_recorded_waiting():
         assert time.monotonic() < end
     counter.publish(10)
     assert recorder.end() == 0
     messages = list(open_bag(recorder.bag).raw(['/count']))
     assert [m.log_time for m in messages] == [100 * SECOND] * 20
-    assert list(open_bag(recorder.bag).raw(['/diagnostics']))  # its own, because asked for
+    own_topic = open_bag(recorder.bag).raw(['/diagnostics'])
+    assert list(own_topic)  # recorded because it is selected
 
 
-def test_files_split_by_duration_and_ended_impatiently_hold_everything(ros, record):
+def test_files_split_by_duration_hold_everything_after_repeated_signals(ros, record):
     counter = Counter(ros, 'count')
     recorder = record(max_duration_s=0.2)
-    recorder.listens_to('/count')
-    counter.heard_by(1)
+    recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(1)
     counter.publish(1000, rate=1000.0)
     recorder.process.send_signal(signal.SIGINT)
     recorder.process.send_signal(signal.SIGINT)
     assert recorder.end(signal.SIGTERM) == 0
-    assert 'Traceback' not in recorder.said
+    assert 'Traceback' not in recorder.log
     assert counts(recorder.bag, '/count') == list(range(1000))
     assert len(open_bag(recorder.bag).files) >= 4
 
 
 def test_two_recorders_of_one_name_go_on_with_a_bag_each(ros, record):
-    """The second finds no way to poll for messages: its executor takes them."""
     counter = Counter(ros, 'count')
-    both = record(), record(before=NOT_POLLED)
+    both = record(), record()
     for recorder in both:
-        recorder.listens_to('/count')
-    counter.heard_by(2)
+        recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(2)
     counter.publish(100)
-    both[0].wait_for('there is another node /recorder_node')
+    both[0].wait_for_log('there is another node /recorder_node')
     for recorder in both:
         assert recorder.end() == 0
         assert counts(recorder.bag, '/count') == list(range(100))
 
 
-def test_what_is_not_allowed_is_one_line_and_makes_nothing(record, tmp_path):
+def test_bad_parameters_end_it_with_one_line_before_it_makes_a_folder(record, tmp_path):
     (tmp_path / 'mine').mkdir()
     exists = record(tmp_path / 'mine')
     misspelt = record(max_size=3)
     for recorder, why in ((exists, 'exists'), (misspelt, 'max_size_mib')):
         assert recorder.wait() == 2
-        (line,) = recorder.said.splitlines()
+        (line,) = recorder.log.splitlines()
         assert line.startswith('recorder_node: error: ')
         assert why in line
     assert list((tmp_path / 'mine').iterdir()) == []
@@ -400,14 +400,14 @@ def test_a_full_disk_ends_it_with_a_readable_bag(ros, record, tmp_path):
     with small_disk(tmp_path / 'disk', '3M') as disk:
         noise = ros.node.create_publisher(String, 'noise', 1000)
         recorder = record(disk / 'bag', topics='/noise')
-        recorder.listens_to('/noise')
+        recorder.wait_for_topics('/noise')
         end = time.monotonic() + DEADLINE
         while recorder.process.poll() is None and time.monotonic() < end:
             noise.publish(String(data=os.urandom(10_000).hex()))
             time.sleep(0.002)
         assert recorder.wait() == 1
-        assert 'No space left' in recorder.said.splitlines()[-1]
-        assert 'Traceback' not in recorder.said
+        assert 'No space left' in recorder.log.splitlines()[-1]
+        assert 'Traceback' not in recorder.log
         bag = open_bag(disk / 'bag')
         assert bag.complete
         assert sum(1 for _ in bag.raw()) > 20
@@ -416,10 +416,10 @@ def test_a_full_disk_ends_it_with_a_readable_bag(ros, record, tmp_path):
 def test_a_folder_that_is_removed_ends_it_with_a_line(ros, record):
     counter = Counter(ros, 'count')
     recorder = record()
-    recorder.listens_to('/count')
-    counter.heard_by(1)
+    recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(1)
     shutil.rmtree(recorder.bag)
     counter.publish(1000, rate=1000.0)
     assert recorder.wait() == 1
-    assert 'removed' in recorder.said.splitlines()[-1]
-    assert 'Traceback' not in recorder.said
+    assert 'removed' in recorder.log.splitlines()[-1]
+    assert 'Traceback' not in recorder.log

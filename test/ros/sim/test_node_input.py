@@ -1,4 +1,4 @@
-"""sim_node in a process of its own is disturbed neither by others nor by bad input."""
+"""sim_node in its own process: neither other nodes nor bad input disturb it."""
 
 from collections import Counter
 import copy
@@ -19,7 +19,7 @@ from rclpy.serialization import serialize_message
 
 from disc_sim_ros.ros.cdr_template import assign
 from disc_sim_ros.ros.sim.commands import MOST_WAITING
-from ros.hearing import (
+from ros.sim.sim_messages import (
     LONG,
     PERIOD,
     SECOND,
@@ -44,11 +44,11 @@ def test_discs_side_by_side_do_not_mix(ros):
     blue = ros.start(LONG | {'frame_prefix': 'blue/', 'launch.speed': 20.0}, namespace='/blue')
     other = ros.start(LONG, '-r', 'odom:=/other/odom', '-r', '__node:=third')
     other.name = '/third'
-    heard = {
+    received = {
         sim: {
-            Odometry: ros.listen(Odometry, odom),
-            TransformStamped: ros.listen(TransformStamped, transform),
-            WrenchStamped: ros.listen(WrenchStamped, moment),
+            Odometry: ros.subscribe(Odometry, odom),
+            TransformStamped: ros.subscribe(TransformStamped, transform),
+            WrenchStamped: ros.subscribe(WrenchStamped, moment),
         }
         for sim, odom, transform, moment in (
             (red, '/red/odom', '/red/transform', '/red/applied_moment'),
@@ -56,32 +56,37 @@ def test_discs_side_by_side_do_not_mix(ros):
             (other, '/other/odom', '/transform', '/applied_moment'),
         )
     }
-    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
     torque = ros.publisher(WrenchStamped, '/red/cmd_moment')
-    ros.spin_until(lambda: all(sum(map(len, h.values())) > 1 for h in heard.values()), 'odom')
-    for sim in heard:
+    ros.spin_until(
+        lambda: all(sum(map(len, topics.values())) > 1 for topics in received.values()), 'odom'
+    )
+    for sim in received:
         throw(ros, sim, 1)
     command = WrenchStamped()
     command.header.frame_id = 'red/disc'
     command.wrench.torque.x = 0.001
     torque.publish(command)
-    ros.spin_until(lambda: heard[red][WrenchStamped], 'the moment')
+    ros.spin_until(lambda: received[red][WrenchStamped], 'the moment')
 
-    def fly() -> bool:
-        return all(any(m.twist.twist.linear.x > 0.0 for m in h[Odometry]) for h in heard.values())
+    def all_fly() -> bool:
+        return all(
+            any(m.twist.twist.linear.x > 0.0 for m in topics[Odometry])
+            for topics in received.values()
+        )
 
-    ros.spin_until(fly, 'all three in the air')
+    ros.spin_until(all_fly, 'all three in the air')
     ros.spin_until(lambda: len({a.status[0].name for a in diagnostics}) == 3, 'diagnostics')
     for sim, speed, prefix in ((red, 10.0, 'red/'), (blue, 20.0, 'blue/'), (other, 15.0, '')):
-        odom = heard[sim][Odometry]
+        odom = received[sim][Odometry]
         assert {(m.header.frame_id, m.child_frame_id) for m in odom} == {('map', f'{prefix}disc')}
         fastest = max(m.twist.twist.linear.x for m in odom)
         assert fastest == pytest.approx(speed, rel=0.01)
-        frames = {(m.header.frame_id, m.child_frame_id) for m in heard[sim][TransformStamped]}
+        frames = {(m.header.frame_id, m.child_frame_id) for m in received[sim][TransformStamped]}
         assert frames == {('map', f'{prefix}disc'), (f'{prefix}disc', f'{prefix}disc_body')}
         assert set(np.diff([stamp(m) for m in odom])) == {PERIOD}
-    assert not heard[blue][WrenchStamped]
-    assert not heard[other][WrenchStamped]
+    assert not received[blue][WrenchStamped]
+    assert not received[other][WrenchStamped]
     assert {a.status[0].name for a in diagnostics} == {
         'red/sim_node: simulation',
         'blue/sim_node: simulation',
@@ -103,7 +108,7 @@ def bad(message, **changes):
 
 THROW, TORQUE, VECTOR = release_of(), WrenchStamped(), Vector3Stamped()
 AT, TURN = 'pose__pose__position', 'pose__pose__orientation'
-BAD = {  # for each topic, messages and why they are dropped
+BAD = {  # for each topic, messages and patterns of the reason why they are dropped
     'cmd_moment': [
         (bad(TORQUE, wrench__torque__x=math.nan), 'torque.x: nan'),
         (bad(TORQUE, wrench__torque__y=-math.inf), 'torque.y: -inf'),
@@ -141,12 +146,12 @@ BAD = {  # for each topic, messages and why they are dropped
 
 
 def test_bad_commands_are_dropped_with_a_reason_and_the_flight_goes_on(ros):
-    """Bit for bit as that of a simulator that nobody talks to; some simulators share the work."""
+    """The flight is bit for bit that of a simulator without commands; three share the commands."""
     spaces = ('/a', '/b', '/c')
     for space in (*spaces, '/alone'):
         ros.start(LONG | {'real_time_factor': 2.0}, namespace=space)
-    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
-    odom = {s: ros.listen(Odometry, f'{s}/odom', raw=True) for s in (*spaces, '/alone')}
+    diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
+    odom = {s: ros.subscribe(Odometry, f'{s}/odom', raw=True) for s in (*spaces, '/alone')}
     publishers = {
         (space, topic): ros.publisher(type(messages[0][0]), f'{space}/{topic}')
         for space in spaces
@@ -160,7 +165,7 @@ def test_bad_commands_are_dropped_with_a_reason_and_the_flight_goes_on(ros):
         return diagnostics_of(own)
 
     todo = {topic: list(messages) for topic, messages in BAD.items()}
-    begun, sent = time.monotonic(), Counter()
+    begin, sent = time.monotonic(), Counter()
     while any(todo.values()):
         expected = {}
         for space in spaces:
@@ -170,17 +175,17 @@ def test_bad_commands_are_dropped_with_a_reason_and_the_flight_goes_on(ros):
                     publishers[space, topic].publish(message)
                     sent[space, topic] += 1
 
-        def is_told(space: str, topic: str, why: str) -> bool:
+        def is_reported(space: str, topic: str, why: str) -> bool:
             values = newest(space)
             return values.get(f'{topic} dropped') == str(sent[space, topic]) and bool(
                 re.search(why, values[f'{topic} last reason'])
             )
 
         ros.spin_until(
-            lambda: all(is_told(*key, why) for key, why in expected.items()),  # noqa: B023
+            lambda: all(is_reported(*key, why) for key, why in expected.items()),  # noqa: B023
             f'dropped: {expected}',
         )
-    took = time.monotonic() - begun
+    duration = time.monotonic() - begin
 
     flown = {space: since(odom[space], release[space]) for space in odom}
     common = set.intersection(*(set(flight) for flight in flown.values()))
@@ -195,35 +200,35 @@ def test_bad_commands_are_dropped_with_a_reason_and_the_flight_goes_on(ros):
         assert values['throws'] == '1'
     for sim in ros.sims:
         warnings = [line for line in sim.stderr.splitlines() if 'dropped: ' in line]
-        # One a second and topic.
-        at_most = 0 if sim.name.startswith('/alone') else len(BAD) * (took + 2)
+        # One per second and topic.
+        at_most = 0 if sim.name.startswith('/alone') else len(BAD) * (duration + 2)
         assert bool(at_most) <= len(warnings) <= at_most
         assert not re.search('Traceback|Error', sim.stderr)
 
 
 def memory(sim) -> int:
-    """Resident memory of a simulator [bytes]."""
+    """Return the resident memory of a simulator [bytes]."""
     status = Path(f'/proc/{sim.process.pid}/status').read_text()
     return int(re.search(r'VmRSS:\s+(\d+) kB', status)[1]) * 1024
 
 
 def test_a_flood_of_commands_breaks_neither_pace_nor_memory(ros):
     sim = ros.start(LONG)
-    applied = ros.listen(WrenchStamped, 'applied_moment')
-    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
-    odom = ros.listen(Odometry, 'odom', raw=True)
+    applied = ros.subscribe(WrenchStamped, 'applied_moment')
+    diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
     torque = ros.publisher(WrenchStamped, 'cmd_moment')
     fly_until(ros, odom, 0)
     throw(ros, sim, 1)
     ros.spin_until(lambda: diagnostics, 'diagnostics')
-    before, count, begun = memory(sim), len(diagnostics), time.monotonic()
+    before, count, begin = memory(sim), len(diagnostics), time.monotonic()
     message = serialize_message(WrenchStamped())
-    sent, due = 0, begun
-    while due < begun + 1.0:
+    sent, due = 0, begin
+    while due < begin + 1.0:
         for _ in range(100):
             torque.publish(message)
         sent, due = sent + 100, due + 0.005
-        ros.spin_until(lambda: time.monotonic() >= min(due, begun + 1.0))  # noqa: B023
+        ros.spin_until(lambda: time.monotonic() >= min(due, begin + 1.0))  # noqa: B023
     last = WrenchStamped()
     last.wrench.torque.x = 0.001
     torque.publish(last)
@@ -239,12 +244,12 @@ def test_a_flood_of_commands_breaks_neither_pace_nor_memory(ros):
     assert set(np.diff([ns(m) for m in odom])) == {PERIOD}
 
 
-def test_commands_for_the_future_are_limited_and_those_for_now_are_not(ros):
-    """Of those for now only the newest waits, also while time stands still."""
+def test_commands_for_the_future_are_limited_in_number_and_those_for_now_are_not(ros):
+    """Of those for now only the newest waits, also while paused."""
     sim = ros.start(LONG)
-    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
-    applied = ros.listen(WrenchStamped, 'applied_moment')
-    odom = ros.listen(Odometry, 'odom', raw=True)
+    diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
+    applied = ros.subscribe(WrenchStamped, 'applied_moment')
+    odom = ros.subscribe(Odometry, 'odom', raw=True)
     torque = ros.publisher(WrenchStamped, 'cmd_moment')
     coefficients = ros.publisher(Vector3Stamped, 'cmd_coefficients')
     fly_until(ros, odom, 0)
@@ -253,14 +258,14 @@ def test_commands_for_the_future_are_limited_and_those_for_now_are_not(ros):
 
     now, future = WrenchStamped(), Vector3Stamped()
     future.header.stamp.sec = 1_000_000
-    sent, batch = 0, 50  # a reader holds 100
+    sent, batch = 0, 50  # the subscription keeps 100
     while sent < MOST_WAITING + batch:
         for _ in range(batch):
             sent += 1
             now.wrench.torque.x = 1e-6 * sent
             torque.publish(now)
             coefficients.publish(future)
-        before = ns(odom[-1])  # the topics are polled while the disc flies on
+        before = ns(odom[-1])  # the topics are polled at a step
         ros.call(sim, 'step')
         fly_until(ros, odom, before + 1)
 
@@ -277,16 +282,16 @@ def test_commands_for_the_future_are_limited_and_those_for_now_are_not(ros):
     assert (values['cmd_moment accepted'], values['cmd_moment dropped']) == (str(sent), '0')
     applied.clear()
 
-    # A controller that goes on while time stands still, and what acts when it moves again.
+    # A controller goes on while the simulator is paused; then its newest command acts.
     for _ in range(0, MOST_WAITING + batch, batch):
         for _ in range(batch):
             sent += 1
             now.wrench.torque.x = 1e-6 * sent
             torque.publish(now)
-        ros.pause(sim)  # a round trip, while the topic is polled
+        ros.pause(sim)  # a round trip, during which the topic is polled
     ros.spin_until(lambda: accepted(diagnostics, 'cmd_moment') == sent, 'all taken')
     assert diagnostics_of(diagnostics)['cmd_moment dropped'] == '0'
     assert not applied
-    ros.pause(sim, still=False)
+    ros.resume(sim)
     ros.spin_until(lambda: applied, 'a moment')
     assert applied[0].wrench.torque.x == now.wrench.torque.x

@@ -1,4 +1,4 @@
-"""What there is to look at: the disc, and the field of a flight from its start to its landing."""
+"""The markers: the disc, and the field of a flight from its release to its landing."""
 
 import math
 
@@ -20,27 +20,27 @@ from disc_sim_ros.ros.sim.markers import (
     disc_markers,
     field_markers,
 )
-from disc_sim_ros.ros.sim.publishers import Outputs
+from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.simulation import Simulation
 from disc_sim_ros.topics import Frames
 
 FRAMES = Frames.prefixed('red/')
 DIAMETER = 0.275
-LARGEST = 100_000  # bytes of a latched message that every late recorder gets
+LARGEST = 100_000  # bytes of a latched message, which each new subscription gets
 
 
 def by_namespace(message: MarkerArray) -> dict[str, list[Marker]]:
-    found: dict[str, list[Marker]] = {}
+    markers: dict[str, list[Marker]] = {}
     for marker in message.markers:
-        found.setdefault(marker.ns, []).append(marker)
-    return found
+        markers.setdefault(marker.ns, []).append(marker)
+    return markers
 
 
 def radius(marker: Marker) -> float:
     return max(math.hypot(p.x, p.y) for p in marker.points)
 
 
-def test_the_disc_of_the_field_is_that_of_the_close_up_but_larger():
+def test_the_disc_of_the_field_is_an_enlargement_of_the_disc():
     (true_size,) = disc_markers(FRAMES.disc_body, DIAMETER).markers
     (enlarged,) = by_namespace(field_markers(FRAMES, DIAMETER, (0, 0, 0)))['disc_enlarged']
     assert radius(true_size) == pytest.approx(0.5 * DIAMETER)
@@ -50,18 +50,18 @@ def test_the_disc_of_the_field_is_that_of_the_close_up_but_larger():
 
 
 def test_lines_have_their_distances():
-    found = by_namespace(field_markers(FRAMES, DIAMETER, (0, 0, 0)))
-    (lines,) = found['lines']
+    markers = by_namespace(field_markers(FRAMES, DIAMETER, (0, 0, 0)))
+    (lines,) = markers['lines']
     ends = zip(lines.points[::2], lines.points[1::2], strict=True)
     across = {start.x for start, end in ends if start.x == end.x}
-    assert {x for x in across if x >= 0} == {text.pose.position.x for text in found['distances']}
-    assert [text.text for text in found['distances']][:3] == ['0 m', '10 m', '20 m']
+    assert {x for x in across if x >= 0} == {text.pose.position.x for text in markers['distances']}
+    assert [text.text for text in markers['distances']][:3] == ['0 m', '10 m', '20 m']
     assert max(across) == FIELD_AHEAD
     assert sorted(across)[1] - sorted(across)[0] == FIELD_SPACING
     assert len(lines.points) == len(lines.colors)
 
 
-def test_every_marker_is_one_that_viewers_take():
+def test_every_marker_is_one_that_viewers_show():
     message = field_markers(FRAMES, DIAMETER, (1, 2, 3), (20, -3, 0), '20 m')
     shown = message.markers
     assert len({(marker.ns, marker.id) for marker in shown}) == len(shown)
@@ -75,7 +75,7 @@ def test_every_marker_is_one_that_viewers_take():
     assert len(serialize_message(message)) < LARGEST
 
 
-def test_the_landing_of_the_flight_before_is_taken_away():
+def test_a_new_flight_deletes_the_landing_of_the_last_one():
     before = by_namespace(field_markers(FRAMES, DIAMETER, (0, 0, 0), (20, -3, 0), '20 m'))
     after = by_namespace(field_markers(FRAMES, DIAMETER, (0, 0, 0)))
     for name in ('landing', 'result'):
@@ -84,40 +84,38 @@ def test_the_landing_of_the_flight_before_is_taken_away():
         assert [marker.id for marker in before[name]] == [marker.id for marker in after[name]]
 
 
-class Kept:
-    """Topics without a network that keep what was published."""
+class ListSinkFactory:
+    """Makes sinks without a network, which keep what is published."""
 
-    name = 'sim_node'
-    heard = False  # nobody asks for the other topics
+    node_name = 'sim_node'
 
     def __init__(self):
         self.messages = {}
 
-    def channel(self, kind, name, qos, wire=None):
-        channel = type('Channel', (), {'heard': False})()
-        channel.publish = self.messages.setdefault(name, []).append
-        channel.send = lambda *values: channel.publish(wire.pack(*values))
-        return channel
+    def sink(self, message_type, name, qos, template=None):
+        sink = type('ListSink', (), {'has_subscribers': False})()
+        sink.publish = self.messages.setdefault(name, []).append
+        sink.send = lambda *values: sink.publish(template.pack(*values))
+        return sink
 
 
-def arrived(sent: bytes | MarkerArray) -> dict[str, list[Marker]]:
-    """Return what a message or its bytes are at the other end, where colours are 32 bits."""
-    data = sent if isinstance(sent, bytes) else serialize_message(sent)
+def received(published: bytes | MarkerArray) -> dict[str, list[Marker]]:
+    """Return a message or its bytes as a subscriber gets it: its colours have 32 bits."""
+    data = published if isinstance(published, bytes) else serialize_message(published)
     return by_namespace(deserialize_message(data, MarkerArray))
 
 
 def test_a_flight_shows_its_disc_from_the_start_and_its_landing_at_the_end():
-    kept = Kept()
+    factory = ListSinkFactory()
     config = configuration({})
-    sim = Simulation(
-        config, Outputs(kept, Frames(), with_clock=False), Commands(None, Frames()), 0, print
-    )
-    sim.publish_look()
+    publishers = Publishers(factory, Frames(), with_clock=False)
+    sim = Simulation(config, publishers, Commands(None, Frames()), 0, print)
+    sim.publish_markers()
     sim.throw()
     while sim.flying:
-        sim.leap(config.steps_per_publish)
-    waiting, thrown, landed = map(arrived, kept.messages[topics.FIELD_MARKERS])
-    assert len(kept.messages[topics.MARKERS]) == 2
+        sim.advance(config.steps_per_publish)
+    waiting, thrown, landed = map(received, factory.messages[topics.FIELD_MARKERS])
+    assert len(factory.messages[topics.MARKERS]) == 2
     assert waiting['disc_enlarged'] == thrown['disc_enlarged'] == landed['disc_enlarged']
     flight = fly(config.launch, config.setup)
     (spot,), (text,) = landed['landing'], landed['result']
