@@ -1,4 +1,4 @@
-"""What a soak has to keep, with the reason, and the table that says whether it did."""
+"""The criteria of a soak, each with its reason, and the table of the results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ from resources import MOST_FILES, MOST_GROWTH, Sample, growth, settled
 from stamps import Stamps
 from watcher import Second, Values
 
-MOST_UNTOLD = 0.005  # s that time may be off what slips tell; a message is on its way for less
-QUIET = 10  # s without a slip; the quickest message of them tells the offset of the clocks
+MOST_UNREPORTED = 0.005  # s of drift beside the reported slips; no message takes longer
+QUIET = 10  # s without a slip; the fastest message in it shows the offset of the clocks
 STAMP = 1e-6  # s, of stamps as floats
 
 
@@ -18,10 +18,10 @@ class Check:
     """A line of the table.
 
     Attributes:
-        what: Was looked at.
-        measured: Came out.
-        allowed: What may come out; empty where it is only told.
-        kept: Whether it did.
+        what: What was checked.
+        measured: The result.
+        allowed: The allowed result; empty where there is no limit.
+        kept: Whether the result is allowed.
     """
 
     what: str
@@ -38,20 +38,20 @@ def table(checks: Sequence[Check]) -> str:
 
 
 def throws(thrown: Sequence[Values], count: int, period: float) -> Check:
-    """Every throw is told of, and was let go when it was due: weeks of throws are counted on."""
+    """Check that every throw is published, and released when due: users rely on it for weeks."""
     numbers = [int(event['flight']) for event in thrown]
     first = float(thrown[0]['stamp_s'])
     late = max(
         abs(float(event['stamp_s']) - first - period * (number - 1))
         for number, event in zip(numbers, thrown, strict=True)
     )
-    told = f'{len(thrown)}, off by at most {late:.6f} s'
+    measured = f'{len(thrown)}, off by at most {late:.6f} s'
     kept = numbers == list(range(1, count + 1)) and late < STAMP
-    return Check('throws when they are due', told, f'{count}, not off', kept)
+    return Check('throws when they are due', measured, f'{count}, not off', kept)
 
 
 def landings(landed: Sequence[Values], failed: Sequence[Values], thrown: int) -> Check:
-    """Every throw lands once: who waits for a landing that never comes waits for ever."""
+    """Check that every throw lands once: programs wait for the landing."""
     numbers = [int(event['flight']) for event in landed]
     missing = thrown - len(set(numbers))
     again = len(numbers) - len(set(numbers))
@@ -64,46 +64,48 @@ def landings(landed: Sequence[Values], failed: Sequence[Values], thrown: int) ->
 
 
 def evenness(stamps: Stamps, throws: int) -> Check:
-    """Stamps are whole periods from the first, so that estimators need not ask for gaps."""
-    told = (
-        f'{stamps.count} messages over {stamps.span:.0f} s, {stamps.lost} not heard: '
+    """Check that stamps are whole periods from the first: estimators rely on even spacing."""
+    measured = (
+        f'{stamps.count} messages over {stamps.span:.0f} s, {stamps.lost} not received: '
         f'{stamps.uneven} off the grid, '
         f'{stamps.gaps} gaps, {stamps.infinite} not finite'
     )
     kept = stamps.count > 0 and not (stamps.uneven or stamps.gaps or stamps.infinite)
-    kept = kept and stamps.again <= throws
-    return Check('stamps of odom', told, 'none', kept)
+    kept = kept and stamps.repeated <= throws
+    return Check('stamps of odom', measured, 'none', kept)
 
 
-def truth(seconds: Sequence[Second]) -> Check:
-    """Time falls behind the steady clock by what the diagnostics tell as slipped, and no more."""
-    found = []
+def drift(seconds: Sequence[Second]) -> Check:
+    """Check that time falls behind the steady clock only by the slips in the diagnostics."""
+    offsets = []
     for slipped, group in itertools.groupby(seconds, lambda second: second.slipped):
-        quiet = list(group)[1:]  # in the first, what was heard may be from before the slip
-        found += [
+        quiet = list(group)[1:]  # messages in the first may be from before the slip
+        offsets += [
             min(second.offset for second in quiet[i : i + QUIET]) - slipped
             for i in range(0, len(quiet) - QUIET + 1, QUIET)
         ]
-    if not found:
-        return Check('drift that is not told', f'never {QUIET} s without a slip', '', kept=False)
-    least, most = min(found), max(found)
-    told = (
-        f'{(found[-1] - found[0]) * 1e3:+.2f} ms over {seconds[-1].time - seconds[0].time:.0f} s, '
+    what = 'drift that is not reported'
+    if not offsets:
+        return Check(what, f'never {QUIET} s without a slip', '', kept=False)
+    least, most = min(offsets), max(offsets)
+    duration = seconds[-1].time - seconds[0].time
+    measured = (
+        f'{(offsets[-1] - offsets[0]) * 1e3:+.2f} ms over {duration:.0f} s, '
         f'spread {(most - least) * 1e3:.2f} ms'
     )
-    allowed = f'{MOST_UNTOLD * 1e3:g} ms'
-    return Check('drift that is not told', told, allowed, most - least <= MOST_UNTOLD)
+    allowed = f'{MOST_UNREPORTED * 1e3:g} ms'
+    return Check(what, measured, allowed, most - least <= MOST_UNREPORTED)
 
 
 def pace(seconds: Sequence[Second]) -> list[Check]:
-    """Say how the machine let it keep pace; the load of the machine decides."""
-    took = seconds[-1].time - seconds[0].time
+    """Report slips and lateness, which depend on the load of the machine."""
+    duration = seconds[-1].time - seconds[0].time
     late = sorted(second.worst for second in seconds)
     slipped = seconds[-1].slipped - seconds[0].slipped
     return [
         Check(
-            'slipped, as told',
-            f'{slipped:.3f} s in {took:.0f} s, {seconds[-1].slips - seconds[0].slips} times',
+            'slipped, as reported',
+            f'{slipped:.3f} s in {duration:.0f} s, {seconds[-1].slips - seconds[0].slips} times',
         ),
         Check(
             'worst lateness in a second',
@@ -114,9 +116,11 @@ def pace(seconds: Sequence[Second]) -> list[Check]:
     ]
 
 
-def losses(told: Values) -> Check:
-    """The recorder lost nothing, by what it tells itself."""
-    lost = {key: n for key, n in told.items() if key.split()[0] in {'dropped', 'lost', 'gaps'}}
+def losses(diagnostics: Values) -> Check:
+    """Check that the recorder lost nothing, by its own diagnostics."""
+    lost = {
+        key: n for key, n in diagnostics.items() if key.split()[0] in {'dropped', 'lost', 'gaps'}
+    }
     return Check(
         'lost by the recorder',
         ', '.join(f'{key} {n}' for key, n in lost.items()) or '0',
@@ -126,8 +130,8 @@ def losses(told: Values) -> Check:
 
 
 def resources(name: str, samples: Sequence[Sample]) -> list[Check]:
-    """What a process holds does not grow: in a week it would be all that there is."""
-    taken = settled(samples)
+    """Check that the resources of a process do not grow: in a week they would be exhausted."""
+    last = settled(samples)[-1]
     memory, threads, files = (growth(samples, what) for what in ('memory', 'threads', 'files'))
     return [
         Check(
@@ -138,7 +142,7 @@ def resources(name: str, samples: Sequence[Sample]) -> list[Check]:
         ),
         Check(
             f'{name}: threads and open files',
-            f'{taken[-1].threads} and {taken[-1].files}, grew by {threads:+g} and {files:+g}',
+            f'{last.threads} and {last.files}, grew by {threads:+g} and {files:+g}',
             f'{MOST_FILES:g}',
             max(threads, files) <= MOST_FILES,
         ),

@@ -1,4 +1,4 @@
-"""What a process holds: memory, threads and open files, from /proc, over time."""
+"""Resources of a process over time: memory, threads and open files, from /proc."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,21 +6,21 @@ from pathlib import Path
 import re
 import statistics
 
-SETTLED = 0.25  # of the samples: what comes before is warming up
+SETTLED = 0.25  # of the samples: those before are the warm-up
 MOST_GROWTH = 4.0  # MiB from there to the end; an allocator may still take a little
-MOST_FILES = 0.0  # in the median: one that stays open for each throw or guest would be hundreds
+MOST_FILES = 0.0  # in the median: one left open for each throw or guest would be hundreds
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What a process holds at a time.
+    """Resources of a process at a time.
 
     Attributes:
         time: Since the beginning [s].
         memory: Resident set [MiB].
         threads: Number of threads.
         files: Number of open files and sockets.
-        waited: How long all its threads together have been ready and got no core [s].
+        waited: How long all its threads together were ready and had no core [s].
     """
 
     time: float
@@ -31,25 +31,25 @@ class Sample:
 
 
 def sample(pid: int, time: float) -> Sample:
-    """Return what a process holds now.
+    """Return the present resources of a process.
 
     Raises:
         OSError: There is no such process.
     """
     status = Path(f'/proc/{pid}/status').read_text(encoding='ascii', errors='replace')
-    found = {name: re.search(rf'^{name}:\s+(\d+)', status, re.M) for name in ('VmRSS', 'Threads')}
-    memory, threads = (int(match[1]) if match else 0 for match in found.values())
+    matches = (re.search(rf'^{name}:\s+(\d+)', status, re.M) for name in ('VmRSS', 'Threads'))
+    memory, threads = (int(match[1]) if match else 0 for match in matches)
     files = sum(1 for _ in Path(f'/proc/{pid}/fd').iterdir())
     return Sample(time, memory / 1024, threads, files, _waited(pid))
 
 
 def settled(samples: Sequence[Sample]) -> Sequence[Sample]:
-    """Return the samples after warming up."""
+    """Return the samples after the warm-up."""
     return samples[round(SETTLED * len(samples)) :]
 
 
 def growth(samples: Sequence[Sample], what: str) -> float:
-    """Return how much something grew once settled: medians of the first and last eighth."""
+    """Return the growth of a resource after the warm-up: medians of the last and first eighth."""
     values = [getattr(s, what) for s in settled(samples)]
     part = max(len(values) // 8, 1)
     return statistics.median(values[-part:]) - statistics.median(values[:part])

@@ -1,6 +1,6 @@
-"""Who else is in the domain of a soak, each a process of its own.
+"""The other nodes in the domain of a soak, each in its own process.
 
-usage: benchmarks/soak/roles.py pilot | listener | guests
+usage: benchmarks/soak/roles.py pilot | subscriber | guests
 """
 
 import math
@@ -19,40 +19,40 @@ from disc_sim_ros import topics
 from disc_sim_ros.ros import qos
 
 COMMAND_RATE = 50.0  # Hz
-SWAY = (0.004, 0.003)  # C_L, C_M at most
-EVERY, STAY = 10.0, 0.2  # s from guest to guest, and how long each listens
-HEARD = {
+AMPLITUDE = (0.004, 0.003)  # of C_L, C_M
+EVERY, STAY = 10.0, 0.2  # s from guest to guest, and how long each stays
+TYPES = {
     'odom': Odometry, 'pose': PoseStamped, 'transform': TransformStamped, 'imu': Imu,
     'joint_states': JointState, 'aero_wrench': WrenchStamped, 'airspeed': Float64, 'path': Path,
 }  # fmt: skip
 
 
 def pilot() -> None:
-    """Send coefficients that sway, 50 times a second."""
+    """Send varying coefficients, 50 times a second."""
     rclpy.init()
     node = rclpy.create_node('pilot')
-    send = node.create_publisher(Vector3Stamped, topics.CMD_COEFFICIENTS, qos.COMMAND_QOS)
-    message, begun, sent = Vector3Stamped(), time.monotonic(), 0
+    publisher = node.create_publisher(Vector3Stamped, topics.CMD_COEFFICIENTS, qos.COMMAND_QOS)
+    message, start, sent = Vector3Stamped(), time.monotonic(), 0
     while True:
-        now = time.monotonic() - begun
-        message.vector.x = SWAY[0] * math.sin(now)
-        message.vector.y = SWAY[1] * math.cos(0.7 * now)
-        send.publish(message)
+        now = time.monotonic() - start
+        message.vector.x = AMPLITUDE[0] * math.sin(now)
+        message.vector.y = AMPLITUDE[1] * math.cos(0.7 * now)
+        publisher.publish(message)
         sent += 1
-        time.sleep(max(begun + sent / COMMAND_RATE - time.monotonic(), 0.0))
+        time.sleep(max(start + sent / COMMAND_RATE - time.monotonic(), 0.0))
 
 
-def listener() -> None:
-    """Hear every state topic, as a node with callbacks does."""
+def subscriber() -> None:
+    """Subscribe to the state topics, as a node with callbacks does."""
     rclpy.init()
-    node = rclpy.create_node('listener')
-    for name, kind in HEARD.items():
-        node.create_subscription(kind, name, lambda _: None, qos.STATE_QOS)
+    node = rclpy.create_node('subscriber')
+    for name, message_type in TYPES.items():
+        node.create_subscription(message_type, name, lambda _: None, qos.STATE_QOS)
     rclpy.spin(node)
 
 
 def guests() -> None:
-    """Join the domain, hear odom for a moment and leave it, every 10 s."""
+    """Join the domain, subscribe to odom for a moment and leave, every 10 s."""
     while True:
         rclpy.init()
         node = rclpy.create_node('guest')
@@ -68,6 +68,6 @@ def guests() -> None:
 if __name__ == '__main__':
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        {'pilot': pilot, 'listener': listener, 'guests': guests}[sys.argv[1]]()
+        {'pilot': pilot, 'subscriber': subscriber, 'guests': guests}[sys.argv[1]]()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

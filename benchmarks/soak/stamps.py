@@ -1,4 +1,4 @@
-"""Whether the stamps of odom are whole periods apart, and the numbers in it finite."""
+"""Check that the stamps of odom are whole periods apart, and its numbers finite."""
 
 import struct
 from typing import Any
@@ -11,16 +11,16 @@ NANOSECONDS = 1_000_000_000
 
 
 class Stamps:
-    """Takes serialised Odometry as it comes, of one publisher.
+    """Takes the serialised Odometry of one publisher in order.
 
-    What the network lost is known from the sequence number of the next message. A throw shows the
-    state again, with the same stamp.
+    The sequence number of a message shows how many the network lost before it. A throw publishes
+    the state again, with the same stamp.
 
     Attributes:
         count: Messages taken.
         uneven: Stamps that are not a whole number of periods from the first.
         gaps: Stamps further apart than the messages between them, or going back.
-        again: Messages with the stamp of the one before.
+        repeated: Messages with the stamp of the one before.
         lost: Messages that the network lost.
         infinite: Messages with a number that is not finite.
         newest: The last stamp [ns].
@@ -28,7 +28,7 @@ class Stamps:
 
     def __init__(self, rate: float) -> None:
         """Expect so many messages a simulated second."""
-        self.count = self.uneven = self.gaps = self.again = self.lost = self.infinite = 0
+        self.count = self.uneven = self.gaps = self.repeated = self.lost = self.infinite = 0
         self.newest = 0
         self._period = round(NANOSECONDS / rate)
         self._first = self._sequence = 0
@@ -39,7 +39,7 @@ class Stamps:
         return (self.newest - self._first) / NANOSECONDS
 
     def take(self, data: bytes, info: dict[str, Any]) -> None:
-        """Take a message with what the middleware says of it."""
+        """Take a message with its message info."""
         seconds, rest = STAMP.unpack_from(data)
         stamp, sequence = seconds * NANOSECONDS + rest, info['publication_sequence_number']
         if not self.count:
@@ -48,7 +48,7 @@ class Stamps:
         periods, off = divmod(stamp - self.newest, self._period)
         if self.count:
             self.gaps += not messages - 1 <= periods <= messages
-            self.again += periods == messages - 1
+            self.repeated += periods == messages - 1
         self.uneven += off != 0
         self.lost += messages - 1
         numbers = np.frombuffer(data, '<f8', NUMBERS, len(data) - 8 * NUMBERS)

@@ -1,4 +1,4 @@
-"""A node that hears what becomes of every throw, and how time passes."""
+"""A node that records the events of every throw and the passing of time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,22 +24,22 @@ Values = dict[str, str]  # of an event or of diagnostics
 
 EVENTS = QoSProfile(depth=100_000)
 PATIENCE = 20.0  # s
-TO_BE_FOUND = 1.0  # s, for a service to know its client
+MATCHING = 1.0  # s, for a service to match its client
 
 
 @dataclass(frozen=True, slots=True)
 class Second:
-    """What sim_node told of a second, and what odom showed of it.
+    """One second: diagnostics of sim_node and the delay of odom.
 
     Attributes:
         time: By the monotonic clock [s].
-        offset: By how much simulated time was behind that clock at the least [s].
-        slipped: Told in all [s].
-        slips: Told in all.
-        worst: Greatest lateness in it, as told [s].
-        missed: Deadlines, told in all.
-        throws: Told in all.
-        landings: Told in all.
+        offset: Smallest delay of simulated time behind that clock [s].
+        slipped: Reported slips so far [s].
+        slips: Number of slips so far.
+        worst: Greatest lateness in this second [s].
+        missed: Missed deadlines so far.
+        throws: Throws so far.
+        landings: Landings so far.
     """
 
     time: float
@@ -53,13 +53,13 @@ class Second:
 
 
 class Watcher:
-    """Hears events, diagnostics and odom.
+    """Subscribes to events, diagnostics and odom.
 
     Attributes:
         events: (name, values) of each event, in order; a name has the namespace in front.
-        told: The newest values of the diagnostics of each node.
-        seconds: One for each diagnostics of a simulator whose odom was heard meanwhile.
-        stamps: Of odom, where a rate was given.
+        diagnostics: The newest values of the diagnostics of each node.
+        seconds: One for each diagnostics of a simulator whose odom arrived meanwhile.
+        stamps: The stamps of odom, where a rate was given.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Watcher:
     ) -> None:
         """Join the domain; `rate` is that of odom."""
         self.events: list[tuple[str, Values]] = []
-        self.told: dict[str, Values] = {}
+        self.diagnostics: dict[str, Values] = {}
         self.seconds: list[Second] = []
         self.stamps = Stamps(rate or 1.0)
         self._offset = math.inf
@@ -80,13 +80,13 @@ class Watcher:
         self._node = Node('soak', context=self._context, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        listen = self._node.create_subscription
+        subscribe = self._node.create_subscription
         for space in namespaces:
             name = f'{space}/{topics.FLIGHT_EVENTS}'
-            listen(DiagnosticStatus, name, partial(self._on_event, space), EVENTS)
-        listen(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENTS)
+            subscribe(DiagnosticStatus, name, partial(self._on_event, space), EVENTS)
+        subscribe(DiagnosticArray, '/diagnostics', self._on_diagnostics, EVENTS)
         if rate:
-            listen(Odometry, topics.ODOM, self._on_odometry, EVENTS, raw=True)
+            subscribe(Odometry, topics.ODOM, self._on_odometry, EVENTS, raw=True)
 
     def close(self) -> None:
         """Leave the domain."""
@@ -104,25 +104,25 @@ class Watcher:
         """Take messages until a condition holds.
 
         Raises:
-            TimeoutError: It does not in time [s].
+            TimeoutError: It does not within `patience` [s].
         """
         end = time.monotonic() + patience
         while not condition():
             if time.monotonic() > end:
-                raise TimeoutError(f'waited {patience:g} s in vain for {what}')
+                raise TimeoutError(f'timed out after {patience:g} s waiting for {what}')
             self._executor.spin_once(0.05)
 
     def call(self, service: str) -> None:
         """Call a service without arguments.
 
         Raises:
-            TimeoutError: Nobody answers.
+            TimeoutError: The service does not answer.
         """
         client = self._node.create_client(Trigger, service)
         self.spin_until(client.service_is_ready, PATIENCE, service)
-        self.spin(TO_BE_FOUND)
-        answer = client.call_async(Trigger.Request())
-        self.spin_until(answer.done, PATIENCE, f'an answer of {service}')
+        self.spin(MATCHING)
+        future = client.call_async(Trigger.Request())
+        self.spin_until(future.done, PATIENCE, f'an answer of {service}')
 
     def named(self, name: str) -> list[Values]:
         """Return the values of the events of a name."""
@@ -135,7 +135,7 @@ class Watcher:
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
-            self.told[status.name.partition(':')[0]] = values
+            self.diagnostics[status.name.partition(':')[0]] = values
             if status.name.endswith(': simulation') and math.isfinite(self._offset):
                 self._on_second(values)
 
