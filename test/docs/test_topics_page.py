@@ -1,4 +1,4 @@
-"""docs/topics.md names what sim_node publishes, takes, offers and tells, and nothing else."""
+"""docs/topics.md names the topics, services, events and frames of sim_node, and no others."""
 
 from collections.abc import Iterator
 import dataclasses
@@ -38,7 +38,7 @@ def source(name: str) -> str:
     return (NODES / f'{name}.py').read_text(encoding='utf-8')
 
 
-def test_every_topic_is_there_and_no_other():
+def test_the_page_has_every_topic_and_no_other():
     constants = {
         value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)
     }
@@ -49,26 +49,26 @@ def test_every_topic_is_there_and_no_other():
 
 
 def test_types_are_those_of_the_code(types_of_topics):
-    told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Published')}
-    told |= {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Taken')}
+    stated = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Published')}
+    stated |= {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Taken')}
     missing = {topics.TF} if publishers.TFMessage is None else set()
-    assert {name: told[name] for name in told.keys() - missing} == types_of_topics
-    assert told[topics.TF] == 'TFMessage'
+    assert {name: stated[name] for name in stated.keys() - missing} == types_of_topics
+    assert stated[topics.TF] == 'TFMessage'
 
 
 @pytest.fixture
 def types_of_topics() -> dict[str, str]:
-    """The types of all topics, found by making them with a node that only takes note."""
+    """Return the types of all topics: a stand-in for a node records what is created."""
     from diagnostic_msgs.msg import DiagnosticArray
 
     from disc_sim_ros.ros.sim.commands import Commands
     from disc_sim_ros.ros.sinks import PublisherSinkFactory
 
-    class Note:
-        """Stands in for a node, so that this page is tested without a network."""
+    class Recorder:
+        """Records types in place of a node: the test of a page needs no network."""
 
         def __init__(self):
-            self.types = {topics.DIAGNOSTICS: DiagnosticArray.__name__}  # made by the node itself
+            self.types = {topics.DIAGNOSTICS: DiagnosticArray.__name__}  # created by the node
 
         def create_publisher(self, kind, name, *_, **__):
             self.types[name] = kind.__name__
@@ -80,37 +80,37 @@ def types_of_topics() -> dict[str, str]:
         def get_fully_qualified_name(self):
             return '/sim_node'
 
-    note = Note()
-    publishers.Publishers(PublisherSinkFactory(note), Frames(), with_clock=True)
-    Commands(note, Frames())
-    return note.types
+    recorder = Recorder()
+    publishers.Publishers(PublisherSinkFactory(recorder), Frames(), with_clock=True)
+    Commands(recorder, Frames())
+    return recorder.types
 
 
-def test_latched_topics_are_called_so():
+def test_latched_topics_are_marked():
     latched = set(re.findall(r'topics\.(\w+), qos\.LATCHED_QOS', source('sim/publishers')))
-    told = {row[0].strip('`') for row in rows('Published') if 'latched' in row[-1]}
-    assert told == {getattr(topics, name) for name in latched}
-    assert len(told) == 4
+    stated = {row[0].strip('`') for row in rows('Published') if 'latched' in row[-1]}
+    assert stated == {getattr(topics, name) for name in latched}
+    assert len(stated) == 4
 
 
-def test_every_service_is_there_and_no_other():
+def test_the_page_has_every_service_and_no_other():
     made = re.findall(r"create_service\((\w+), '([^']+)'", source('sim/services'))
-    told = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Services')}
-    assert told == {name: kind for kind, name in made}
+    stated = {row[0].strip('`'): row[1].partition('/')[2] for row in rows('Services')}
+    assert stated == {name: kind for kind, name in made}
 
 
-def test_every_event_is_there_and_no_other():
+def test_the_page_has_every_event_and_no_other():
     assert set(named('Events')) == set(re.findall(r"Event\('([^']+)'", source('sim/events')))
 
 
-def test_every_value_of_an_event_is_there():
+def test_the_page_has_every_value_of_an_event():
     events = re.split('^### Events$', PAGE, flags=re.MULTILINE)[1].partition('\n## ')[0]
-    told = set(re.findall(r'`(\w+)`', events))
+    stated = set(re.findall(r'`(\w+)`', events))
     made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim/events'))
-    assert set(made) <= told
+    assert set(made) <= stated
 
 
-def test_every_frame_is_there_and_no_other():
+def test_the_page_has_every_frame_and_no_other():
     assert named('Frames') == [field.default for field in dataclasses.fields(Frames)]
 
 
@@ -126,14 +126,14 @@ def test_limits_are_those_of_the_code():
     assert f'up to {rate.highest:g} {rate.unit}' in taken[topics.THROW]
 
 
-def test_numbers_of_the_text_are_those_of_the_code():
+def test_numbers_in_the_text_are_those_of_the_code():
     from disc_sim_ros.ros.sim import commands, markers, realtime
 
     assert f'the last {publishers.LONGEST_PATH}' in PAGE
     assert f'the disc {markers.ENLARGEMENT:g} times enlarged' in PAGE
     assert f'lines every {markers.FIELD_SPACING:g} m' in PAGE
-    assert f'At most {commands.MOST_WAITING} of a topic' in PAGE
+    assert f'most {commands.MOST_WAITING} of a topic' in PAGE
     assert f'up to {realtime.CATCH_UP:g} s of wall time' in PAGE
     assert f'every {qos.CLOCK_PERIOD * 1000:g} ms of wall time' in PAGE
-    assert f'keeps the last {qos.STATE_QOS.depth} messages' in PAGE
-    assert f'Reliable, the last {qos.COMMAND_QOS.depth}.' in PAGE
+    assert f'keep the last {qos.STATE_QOS.depth} messages' in PAGE
+    assert f'reliable and keep the last {qos.COMMAND_QOS.depth} messages.' in PAGE
