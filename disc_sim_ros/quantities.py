@@ -27,11 +27,11 @@ LAUNCH = _table(
     ),
     Quantity(
         'angle_of_attack', 'degrees', -180.0, 180.0, 0.0,
-        'Angle of the velocity to the plane of the disc', 'velocity below the plane positive',
+        'Angle of attack: angle of the velocity below the plane of the disc',
     ),
     Quantity(
         'sideslip', 'degrees', -180.0, 180.0, 0.0,
-        'Angle of the velocity to the x axis of the disc, in its plane', 'to the right positive',
+        'Sideslip: angle of the velocity right of the x axis, in the plane of the disc',
     ),
     Quantity(
         'spin', 'rad/s', -1000.0, 1000.0, 31.416, 'Spin rate', 'clockwise from above positive'
@@ -50,7 +50,7 @@ LAUNCH = _table(
 )  # fmt: skip
 ADVANCE_RATIO = Quantity(
     'advance_ratio', '', -100.0, 100.0, None,
-    'Spin as r c / (2 speed), c the diameter of the disc', 'clockwise from above positive',
+    'Advance ratio r c / (2 V) at release', 'clockwise from above positive',
 )  # fmt: skip
 
 # The air; the fields of physics.environment.Wind and Air.
@@ -268,6 +268,17 @@ RECORDING = _table(
     ),
 )  # fmt: skip
 
+# Ensembles.
+STUDY = _table(
+    Quantity('count', '', 1, 2**30, 1, 'Samples at each point of a grid', whole=True),
+    Quantity(
+        'scatter_seed', '', 0, LARGEST_SEED, 0,
+        'Seed of the scatter; the same seed gives the same samples', whole=True,
+    ),
+    Quantity('percentile', '%', 1.0, 99.0, None, 'Percentile of the results'),
+    Quantity('workers', '', 1, 1024, None, 'Threads or processes', whole=True),
+)  # fmt: skip
+
 # Every quantity by name, in its whole range.
 QUANTITIES = {
     **VARIED,
@@ -279,5 +290,6 @@ QUANTITIES = {
     **TIMING,
     **IMU,
     **RECORDING,
+    **STUDY,
     **_table(POSITION, VELOCITY, ORIENTATION, STEP, DURATION, SAMPLE_RATE),
 }

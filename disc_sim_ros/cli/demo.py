@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Self
 import disc_sim_ros
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import flags, output
-from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.arguments import Parser, add_quantity
 from disc_sim_ros.cli.main import DIFFERENT, run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
+from disc_sim_ros.quantities import DURATION, TIMING
 
 if TYPE_CHECKING:
     from disc_sim_ros.ros.client import DiscSample
 
-WHOLE_FLIGHT = 3600.0  # s that --control acts without being renewed
+WHOLE_FLIGHT = TIMING['command_timeout'].highest  # s that --control acts without being renewed
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -43,7 +44,7 @@ def parser(prog: str = 'demo') -> Parser:
     flags.add_air(p, 'air and control inputs')
     kept = p.add_argument_group('recording')
     text = 'longest time to wait for the landing'
-    flags.add_number(kept, '--seconds', 60.0, 0.1, flight.LONGEST, 's', 'S', text)
+    add_quantity(kept, '--seconds', DURATION.within(0.1), dest='seconds', text=text)
     kept.add_argument(
         '--bag',
         default=argparse.SUPPRESS,
@@ -56,13 +57,7 @@ def parser(prog: str = 'demo') -> Parser:
 
 def main(arguments: Sequence[str] | None = None, prog: str = 'demo') -> int:
     """Run `demo` and return its exit code."""
-    return run_program(parser(prog), _run, arguments, in_flags=_in_flags)
-
-
-def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
-    """Return an error that names the flag."""
-    flag = flags.flag_of(error, chosen)
-    return ConfigError('--bag' if flag == 'bag' else flag, error.value, error.allowed)
+    return run_program(parser(prog), _run, arguments, in_flags=flags.in_flags)
 
 
 def _run(chosen: argparse.Namespace) -> int:

@@ -1,56 +1,55 @@
-"""The flags of a throw, which `fly` and `demo` share, and what they mean together."""
+"""The flags of a throw, which several programs share, and what they mean together."""
 
 import argparse
 import math
 from pathlib import Path
 
-from disc_sim_ros.cli.arguments import Parser, number
+from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import disc_file, flight, launch, theory
 from disc_sim_ros.physics.disc import AERODYNAMICS
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.kernels.equations import Control
-from disc_sim_ros.quantities import LAUNCH
+from disc_sim_ros.quantities import (
+    ADVANCE_RATIO,
+    AIR,
+    CONTROL,
+    DURATION,
+    LAUNCH,
+    MEAN_WIND,
+    SAMPLE_RATE,
+    STEP,
+    TIMING,
+    WIND,
+)
+from disc_sim_ros.ros.sim.parameters import PARAMETER_OF
 
 PAPER = 'Crowther & Potts, Sports Engineering 10 (2007) 3-21'
-DEFAULT_DISC = 'frisbee'
-PUBLISH_RATE = 200.0  # Hz at most, in bags: as sim_node does by default
+PUBLISH_RATE: float = TIMING['publish_rate'].default  # Hz at most, in bags: as of sim_node
 
-# Flag, field of Launch, metavar, help.
-LAUNCH_FLAGS = (
-    ('--speed', 'speed', 'M/S', 'speed over the ground'),
-    ('--pitch', 'pitch', 'DEG', 'nose up positive'),
-    ('--roll', 'roll', 'DEG', 'right edge down positive'),
-    ('--yaw', 'yaw', 'DEG', 'right of +x positive'),
-    ('--alpha', 'angle_of_attack', 'DEG', 'velocity below the x axis of the disc'),
-    ('--sideslip', 'sideslip', 'DEG', 'velocity turned right in the plane of the disc'),
-    ('--roll-rate', 'roll_rate', 'RAD/S', 'p at release'),
-    ('--pitch-rate', 'pitch_rate', 'RAD/S', 'q at release'),
-    ('--height', 'height', 'M', 'of the release above the ground'),
-)
-FLAG_OF = {field: flag for flag, field, _, _ in LAUNCH_FLAGS} | {
-    'spin': '--spin',
-    'physics_rate': '--step, which means a physics_rate',
-    'publish_rate': '--samples',
-    'disc': '--disc',
-    'model': '--model',
-    'aero': '--aero',
-    'moment_axes': '--moment-axes',
-    'step': '--step',
+# The flag of each quantity of a launch.
+LAUNCH_FLAGS = {name: f'--{name.replace("_", "-")}' for name in LAUNCH}
+LAUNCH_FLAGS |= {'angle_of_attack': '--alpha', ADVANCE_RATIO.name: '--advance-ratio'}
+# Quantities of sim_node that a flag gives, and how a message says so.
+_GIVEN_BY = {
+    'physics_rate': (STEP.name, ', which means a physics_rate'),
+    'publish_rate': (SAMPLE_RATE.name, ''),
 }
 
 
 def add_disc(p: Parser) -> None:
-    """Add what flies, and how it is computed."""
-    what = p.add_argument_group('what flies, and how it is computed')
+    """Add the flags of the disc and of the model."""
+    what = p.add_argument_group('disc and model')
     what.add_argument(
         '--disc',
-        default=DEFAULT_DISC,
+        default=disc_file.DEFAULT_DISC,
         metavar='NAME|FILE.yaml',
         help=f'{", ".join(disc_file.disc_names())}, or your own file',
     )
-    what.add_argument('--model', choices=tuple(flight.MODELS), default='exact', help='rigid body')
+    what.add_argument(
+        '--model', choices=tuple(flight.MODELS), default=flight.Setup.model, help='rigid body'
+    )
     what.add_argument(
         '--aero',
         choices=AERODYNAMICS,
@@ -60,66 +59,62 @@ def add_disc(p: Parser) -> None:
     what.add_argument(
         '--moment-axes',
         choices=tuple(flight.MOMENT_AXES),
-        default='body',
+        default=flight.Setup.moment_axes,
         help='axes in which the moment coefficients act: 3 (body) or 4 (wind)',
     )
-    add_number(what, '--step', 1e-3, 1e-6, 0.1, 's', 'S', 'integration step')
+    add_quantity(what, '--step', STEP)
 
 
 def add_launch(p: Parser) -> None:
-    """Add the release."""
-    thrown = p.add_argument_group('launch')
-    for flag, field, metavar, text in LAUNCH_FLAGS:
-        q = LAUNCH[field]
-        add_number(thrown, flag, q.default, q.lowest, q.highest, q.unit, metavar, text)
-    spin = thrown.add_mutually_exclusive_group()
-    q = LAUNCH['spin']
-    text = 'clockwise from above positive'
-    add_number(spin, '--spin', q.default, q.lowest, q.highest, q.unit, 'RAD/S', text)
-    spin.add_argument(
-        '--advance-ratio',
-        type=number(-100.0, 100.0, ''),
-        default=argparse.SUPPRESS,
+    """Add the flags of the release."""
+    group = p.add_argument_group('launch')
+    spin = group.add_mutually_exclusive_group()
+    for name, quantity in LAUNCH.items():
+        add_quantity(spin if name == 'spin' else group, LAUNCH_FLAGS[name], quantity)
+    add_quantity(
+        spin,
+        LAUNCH_FLAGS[ADVANCE_RATIO.name],
+        ADVANCE_RATIO,
         metavar='R',
-        help='spin as r c / (2 speed) instead, c the diameter; from -100 to 100',
+        text='spin as r c / (2 speed), where c is the diameter of the disc',
+        default=argparse.SUPPRESS,
     )
 
 
 def add_air(p: Parser, title: str) -> argparse._ArgumentGroup:
-    """Add controls and air, and return their group."""
-    around = p.add_argument_group(title)
-    around.add_argument(
-        '--control',
-        nargs=3,
-        type=number(-10.0, 10.0, ''),
-        default=(0.0, 0.0, 0.0),
-        metavar=('CL', 'CM', 'CN'),
-        help='control input coefficients for the whole flight: roll right, nose up, spin up '
-        'positive; from -10 to 10 each',
+    """Add the flags of the control inputs and of the air, and return their group."""
+    group = p.add_argument_group(title)
+    text = (
+        'control input coefficients for the whole flight: right edge down, nose up and clockwise '
+        'from above positive'
     )
-    around.add_argument(
-        '--wind',
-        nargs=3,
-        type=number(-100.0, 100.0, 'm/s'),
-        default=(0.0, 0.0, 0.0),
-        metavar=('X', 'Y', 'Z'),
-        help='where the air moves to; from -100 to 100 m/s each',
+    add_components(group, '--control', list(CONTROL.values()), ('CL', 'CM', 'CN'), text)
+    text = 'velocity of the air in map axes'
+    add_components(group, '--wind', list(MEAN_WIND.values()), ('X', 'Y', 'Z'), text)
+    add_quantity(group, '--turbulence', WIND['turbulence'])
+    add_quantity(group, '--seed', WIND['gust_seed'], dest='seed')
+    add_quantity(group, '--air-density', AIR['air_density'])
+    add_quantity(group, '--gravity', AIR['gravity'])
+    return group
+
+
+def add_duration(group: argparse._ActionsContainer) -> None:
+    """Add `--duration`, at least as long as the shortest step."""
+    add_quantity(group, '--duration', DURATION.within(STEP.lowest))
+
+
+def add_no_ground(group: argparse._ActionsContainer) -> None:
+    """Add `--no-ground`."""
+    group.add_argument(
+        '--no-ground', action='store_true', help='continue below z = 0, for the whole --duration'
     )
-    text = 'Dryden gusts (MIL-F-8785C) of a mean wind of this speed at 6 m; 15 is moderate'
-    add_number(around, '--turbulence', 0.0, 0.0, 50.0, 'm/s', 'M/S', text)
-    around.add_argument(
-        '--seed', type=_seed, default=0, metavar='N', help='of the gusts, a whole number from 0'
-    )
-    add_number(around, '--air-density', 1.225, 0.0, 100.0, 'kg/m^3', 'KG/M3', 'of the air')
-    add_number(around, '--gravity', 9.81, 0.0, 100.0, 'm/s^2', 'M/S2', 'of the planet')
-    return around
 
 
 def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
-    """Return what the flags mean.
+    """Return the launch and the setup that the flags describe.
 
     Raises:
-        ConfigError: They are not allowed together; `flag_of` says for which flag.
+        ConfigError: The flags contradict each other; `in_flags` returns it with the flag.
     """
     disc = disc_file.load_disc(chosen.disc)
     spin = chosen.spin
@@ -127,7 +122,7 @@ def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
         if chosen.speed == 0.0 and chosen.advance_ratio != 0.0:
             raise ConfigError('--advance-ratio', chosen.advance_ratio, 'at --speed 0 give --spin')
         spin = theory.spin_rate(chosen.advance_ratio, disc.diameter, chosen.speed)
-    values = {field: getattr(chosen, _dest(flag)) for flag, field, _, _ in LAUNCH_FLAGS}
+    values = {name: getattr(chosen, name) for name in LAUNCH} | {'spin': spin}
     setup = flight.Setup(
         disc=disc,
         model=chosen.model,
@@ -141,31 +136,38 @@ def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
         ),
         step=chosen.step,
     )
-    return launch.Launch(spin=spin, **values), setup
+    return launch.Launch(**values), setup
 
 
 def control_of(chosen: argparse.Namespace) -> Control:
-    """Return the control inputs."""
+    """Return the control inputs of `--control`."""
     return Control(*chosen.control)
 
 
 def parameters(
     chosen: argparse.Namespace, release: launch.Launch, setup: flight.Setup
 ) -> dict[str, bool | float | str]:
-    """Return the parameters of a sim_node that flies the same.
+    """Return the parameters of a sim_node that flies the same flight.
 
     Raises:
-        ConfigError: A step that is no number of steps a second.
+        ConfigError: The step does not divide a second into a whole number of steps.
     """
     rate = _reciprocal(setup.step)
     if rate is None:
         near = 1.0 / round(1.0 / setup.step)
         allowed = f'nodes and bags need a whole number of steps a second; near is {near:.12g}'
-        raise ConfigError('--step', setup.step, allowed)
+        raise ConfigError('--step', setup.step, allowed, STEP.name)
     disc = (
         chosen.disc if chosen.disc in disc_file.disc_names() else str(Path(chosen.disc).absolute())
     )
-    x, y, z = chosen.wind
+    quantities: dict[str, float] = {
+        'air_density': setup.air.density,
+        'gravity': setup.air.gravity,
+        **{name: float(getattr(release, name)) for name in LAUNCH},
+        **dict(zip(MEAN_WIND, chosen.wind, strict=True)),
+        'turbulence': setup.wind.turbulence,
+        'gust_seed': setup.wind.seed,
+    }
     return {
         'disc': disc,
         'model': setup.model,
@@ -173,57 +175,27 @@ def parameters(
         'moment_axes': setup.moment_axes,
         'physics_rate': rate,
         'publish_rate': rate / math.ceil(rate / PUBLISH_RATE),
-        'air_density': setup.air.density,
-        'gravity': setup.air.gravity,
-        **{f'launch.{field}': float(getattr(release, field)) for field in LAUNCH},
-        'wind.x': x,
-        'wind.y': y,
-        'wind.z': z,
-        'wind.turbulence': setup.wind.turbulence,
-        'wind.seed': setup.wind.seed,
+        **{PARAMETER_OF[name]: value for name, value in quantities.items()},
     }
 
 
-def flag_of(error: ConfigError, chosen: argparse.Namespace) -> str:
-    """Return the flag that an error is about, or what it calls the thing itself."""
-    flag = FLAG_OF.get(error.thing, error.thing)
-    if flag == '--spin' and hasattr(chosen, 'advance_ratio'):
-        return '--advance-ratio, which means a spin'
-    return flag
+def in_flags(error: ConfigError, chosen: argparse.Namespace, parser: Parser) -> ConfigError:
+    """Return an error under the name of the flag that gave the refused value.
 
-
-def add_number(
-    group: argparse._ActionsContainer,
-    flag: str,
-    default: float,
-    lowest: float,
-    highest: float,
-    unit: str,
-    metavar: str,
-    text: str,
-) -> None:
-    """Add a flag that takes a number in a range."""
-    group.add_argument(
-        flag,
-        type=number(lowest, highest, unit),
-        default=default,
-        metavar=metavar,
-        help=f'{text}; from {lowest:g} to {highest:g} {unit}',
-    )
+    Args:
+        error: The error, of a quantity or an argument of the physics.
+        chosen: The values of the flags.
+        parser: Names the flags.
+    """
+    if error.quantity == 'spin' and hasattr(chosen, ADVANCE_RATIO.name):
+        flag = LAUNCH_FLAGS[ADVANCE_RATIO.name]
+        return error.named(f'{flag}, which means a spin')
+    name, meaning = _GIVEN_BY.get(error.quantity, ('', ''))
+    flag = parser.flag_of(name)
+    return error.named(f'{flag}{meaning}') if flag else parser.in_flags(error)
 
 
 def _reciprocal(step: float) -> float | None:
     """Return the whole rate whose step this is to the last bit, or None."""
     rate = float(round(1.0 / step))
     return rate if 1.0 / rate == step else None
-
-
-def _seed(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) >= 2**63:
-        allowed = f'give a whole number from 0 to {2**63 - 1}'
-        raise argparse.ArgumentTypeError(f'{text!r} is not allowed; {allowed}')
-    return int(text)
-
-
-def _dest(flag: str) -> str:
-    return flag.removeprefix('--').replace('-', '_')

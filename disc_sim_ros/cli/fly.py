@@ -10,19 +10,14 @@ import time
 
 from disc_sim_ros import __version__, files
 from disc_sim_ros.cli import flags, output
-from disc_sim_ros.cli.arguments import Parser, number
+from disc_sim_ros.cli.arguments import Parser, add_quantity
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.quantities import SAMPLE_RATE
 
 DEFAULT_RATE = 100.0  # Hz, of files without --samples
-_FLAG_OF = {
-    'duration': '--duration',
-    'sample_rate': '--samples',
-    'bag': '--bag',
-}
-_HINTS = {'--height': ', or give --no-ground'}
 
 
 def parser(prog: str = 'fly') -> Parser:
@@ -38,23 +33,16 @@ def parser(prog: str = 'fly') -> Parser:
     flags.add_disc(p)
     flags.add_launch(p)
     around = flags.add_air(p, 'air, control inputs and end of the flight')
-    text = 'longest time of flight'
-    flags.add_number(around, '--duration', 60.0, 1e-6, flight.LONGEST, 's', 'S', text)
-    around.add_argument(
-        '--no-ground',
-        action='store_true',
-        help='continue below z = 0, for the whole --duration',
-    )
+    flags.add_duration(around)
+    flags.add_no_ground(around)
 
     shown = p.add_argument_group('output (default: a summary to read)')
-    shown.add_argument(
-        '--samples',
-        type=number(1e-3, 1e4, 'Hz'),
-        default=argparse.SUPPRESS,
-        metavar='HZ',
-        help='samples per second, evenly spaced in time; from 0.001 to 10000 (default: '
-        f'{DEFAULT_RATE:g} in files, {flags.PUBLISH_RATE:g} in bags, otherwise no samples)',
+    text = (
+        f'samples per second, evenly spaced in time (default: {DEFAULT_RATE:g} in files, '
+        f'{flags.PUBLISH_RATE:g} in bags, otherwise no samples)'
     )
+    rates = SAMPLE_RATE.within(1e-3, 1e4)
+    add_quantity(shown, '--samples', rates, dest='samples', text=text, default=argparse.SUPPRESS)
     shape = shown.add_mutually_exclusive_group()
     shape.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'
@@ -79,11 +67,11 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'fly') -> int:
     return run_program(parser(prog), _run, arguments, in_flags=_in_flags)
 
 
-def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
+def _in_flags(error: ConfigError, chosen: argparse.Namespace, parser: Parser) -> ConfigError:
     """Return an error that names the flag and, for a release below the ground, the remedy."""
-    flag = flags.flag_of(error, chosen)
-    flag = _FLAG_OF.get(flag, flag)
-    return ConfigError(flag, error.value, error.allowed + _HINTS.get(flag, ''))
+    remedy = ', or give --no-ground' if error.quantity == 'height' else ''
+    error = ConfigError(error.thing, error.value, error.allowed + remedy, error.quantity)
+    return flags.in_flags(error, chosen, parser)
 
 
 def _run(chosen: argparse.Namespace) -> int:

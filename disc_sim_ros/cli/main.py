@@ -28,7 +28,7 @@ def run_program(
     run: 'Callable[[argparse.Namespace], int]',
     arguments: Sequence[str] | None,
     *,
-    in_flags: 'Callable[[ConfigError, argparse.Namespace], ConfigError] | None' = None,
+    in_flags: 'Callable[[ConfigError, argparse.Namespace, Parser], ConfigError] | None' = None,
 ) -> int:
     """Parse the arguments, run a program and return its exit code.
 
@@ -36,8 +36,8 @@ def run_program(
         parser: The command line of the program.
         run: The program: takes the parsed arguments and returns an exit code.
         arguments: Words of the command line; None for those of this process.
-        in_flags: Returns an error in the words of the command line, which names the flag; None
-            where errors name it already.
+        in_flags: Returns an error under the name of the flag that gave the refused value; None
+            where errors name the flag already.
 
     Raises:
         SystemExit: `--help` or `--version` (code 0), or bad input (code 2, one line on stderr).
@@ -51,7 +51,7 @@ def run_program(
             except UsageError as error:
                 parser.error(str(error))
             except ConfigError as error:
-                parser.error(str(error if in_flags is None else in_flags(error, chosen)))
+                parser.error(str(in_flags(error, chosen, parser) if in_flags else error))
     except DiscSimError as error:
         output.note(parser.prog, f'error: {error}')
         return FAILED

@@ -12,26 +12,17 @@ from typing import TYPE_CHECKING
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import flags as throw_flags
 from disc_sim_ros.cli import output, study_flags
-from disc_sim_ros.cli.arguments import Parser, number
+from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity
 from disc_sim_ros.cli.main import UsageError, run_program
 from disc_sim_ros.cli.study_flags import listed
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
+from disc_sim_ros.quantities import POSITION, STUDY
 
 if TYPE_CHECKING:
     from disc_sim_ros.studies.optimise import Problem
 
 DEFAULT_COUNT = 256  # throws of each launch under scatter
-_FLAG_OF = {
-    'goal': '--for',
-    'target': '--target',
-    'limits': '--limit',
-    'limit': '--limit',
-    'percentile': '--percentile',
-    'count': '--count',
-    'duration': '--duration',
-    'scatter': '--scatter',
-}
 
 
 def parser(prog: str = 'optimise') -> Parser:
@@ -58,32 +49,19 @@ def parser(prog: str = 'optimise') -> Parser:
         dest='goal',
         help='the goal: greatest range, longest time of flight, least distance from --target',
     )
-    what.add_argument(
-        '--target',
-        nargs=2,
-        type=number(-10000.0, 10000.0, 'm'),
-        default=argparse.SUPPRESS,
-        metavar=('X', 'Y'),
-        help='where to land, for --for accuracy; from -10000 to 10000 m each',
-    )
+    text = 'where to land, for --for accuracy'
+    place = (POSITION, POSITION)
+    add_components(what, '--target', place, ('X', 'Y'), text, default=argparse.SUPPRESS)
     text = 'free quantity and its range'
-    study_flags.add_list(what, '--limit', 'NAME=LOW:HIGH', text)
+    study_flags.add_list(what, '--limit', 'NAME=LOW:HIGH', text, dest='limits')
     text = 'normal scatter of the throws around each launch'
     study_flags.add_list(what, '--scatter', 'NAME=SD', text)
-    what.add_argument(
-        '--percentile',
-        type=number(1.0, 99.0, '%'),
-        default=argparse.SUPPRESS,
-        metavar='P',
-        help='optimise this percentile of the throws instead of their mean; from 1 to 99 %%',
-    )
-    what.add_argument(
-        '--count',
-        type=study_flags.whole(2, 100_000),
-        default=DEFAULT_COUNT,
-        metavar='N',
-        help='throws of each launch, with scatter or in gusts',
-    )
+    text = 'optimise this percentile of the throws instead of their mean'
+    options = {'metavar': 'P', 'text': text, 'default': argparse.SUPPRESS}
+    add_quantity(what, '--percentile', STUDY['percentile'], **options)
+    text = 'throws of each launch, with scatter or in gusts'
+    counts = STUDY['count'].within(2, 100_000)
+    add_quantity(what, '--count', counts, text=text, default=DEFAULT_COUNT)
     study_flags.add_seed(what, 'seed of the search, of the scatter and of the gusts')
     shown = p.add_argument_group('output (default: a summary to read)')
     shown.add_argument(
@@ -96,15 +74,8 @@ def parser(prog: str = 'optimise') -> Parser:
 def main(arguments: Sequence[str] | None = None, prog: str = 'optimise') -> int:
     """Run `optimise` and return its exit code: 0, 1 for a failed search, 2 for bad input."""
     words = sys.argv[1:] if arguments is None else arguments
-    return run_program(parser(prog), partial(_run, words=words), words, in_flags=_in_flags)
-
-
-def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
-    """Return an error that names the flag: 'limit spin' becomes '--limit spin'."""
-    first, _, rest = error.thing.partition(' ')
-    flag = throw_flags.flag_of(error, chosen)
-    flag = _FLAG_OF.get(flag, f'{_FLAG_OF[first]} {rest}' if first in _FLAG_OF else flag)
-    return ConfigError(flag, error.value, error.allowed)
+    run = partial(_run, words=words)
+    return run_program(parser(prog), run, words, in_flags=throw_flags.in_flags)
 
 
 def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
@@ -119,7 +90,7 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
     from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
     flags = {word.partition('=')[0] for word in words}
-    given = {name for name, flag in throw_flags.FLAG_OF.items() if flag in flags}
+    given = {name for name, flag in throw_flags.LAUNCH_FLAGS.items() if flag in flags}
     if '--advance-ratio' in flags:
         given.add('spin')
     limits = {n: span for n, span in optimise.HUMAN_LIMITS.items() if n not in given}
@@ -131,9 +102,9 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
             limits['yaw'] = (bearing - 45.0, bearing + 45.0)
     elif chosen.goal == optimise.ACCURACY:
         raise UsageError('--for accuracy needs a target; give --target X Y')
-    for name, span in study_flags.ranges('--limit', listed(chosen, 'limit')).items():
+    for name, span in study_flags.ranges('--limit', listed(chosen, 'limits')).items():
         if name in given:
-            flag = throw_flags.FLAG_OF[name]
+            flag = throw_flags.LAUNCH_FLAGS[name]
             raise ConfigError('--limit', name, f'{flag} fixes it; give one of the two')
         limits[name] = span
     if 'advance_ratio' in limits:

@@ -12,30 +12,18 @@ from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import flags, output, study_flags
-from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.arguments import Parser, add_quantity, whole
 from disc_sim_ros.cli.main import UsageError, run_program
 from disc_sim_ros.cli.progress import ProgressBar, duration
 from disc_sim_ros.cli.study_flags import listed
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.quantities import STUDY
 
 if TYPE_CHECKING:
     from disc_sim_ros.studies.study import Study
 
 DEFAULT_COUNT = 1000  # samples, where a quantity scatters
 DEFAULT_OUTPUT = 'sweep.parquet'
-_FLAG_OF = {
-    'vary': '--vary',
-    'count': '--count',
-    'seed': '--seed',
-    'correlation': '--correlation',
-    'sampling': '--sobol',
-    'duration': '--duration',
-    'output': '--output',
-    'resume': '--resume',
-    'executor': '--executor',
-    'workers': '--workers',
-    'scatter': '--scatter',
-}
 
 
 def parser(prog: str = 'sweep') -> Parser:
@@ -62,17 +50,14 @@ def parser(prog: str = 'sweep') -> Parser:
     study_flags.add_list(what, '--scatter', 'NAME=SD', text)
     text = 'correlation of two scattered quantities, from -1 to 1'
     study_flags.add_list(what, '--correlation', 'A,B=R', text)
-    what.add_argument(
-        '--count',
-        type=study_flags.whole(1, 2**30),
-        default=argparse.SUPPRESS,
-        metavar='N',
-        help=f'samples of the scatter at each grid point (default: {DEFAULT_COUNT}; without '
-        'scatter 1)',
-    )
+    text = f'samples at each grid point (default: {DEFAULT_COUNT}; without scatter 1)'
+    add_quantity(what, '--count', STUDY['count'], text=text, default=argparse.SUPPRESS)
     what.add_argument(
         '--sobol',
-        action='store_true',
+        dest='sampling',
+        action='store_const',
+        const='sobol',
+        default='random',
         help='draw quasi-random samples, which fill the space evenly; best with a --count of 2^k',
     )
     study_flags.add_seed(what, 'seed of the scatter and of the gusts')
@@ -87,7 +72,7 @@ def parser(prog: str = 'sweep') -> Parser:
     study_flags.add_workers(made)
     made.add_argument(
         '--batch',
-        type=study_flags.whole(1, 10**6),
+        type=whole(1, 10**6),
         default=argparse.SUPPRESS,
         metavar='N',
         help='flights that a worker flies and stores at a time (default: 8192)',
@@ -107,13 +92,7 @@ def parser(prog: str = 'sweep') -> Parser:
 def main(arguments: Sequence[str] | None = None, prog: str = 'sweep') -> int:
     """Run `sweep` and return its exit code: 0, 1 for a failed sweep, 2 for bad input."""
     words = sys.argv[1:] if arguments is None else arguments
-    return run_program(parser(prog), partial(_run, words=words), words, in_flags=_in_flags)
-
-
-def _in_flags(error: ConfigError, chosen: argparse.Namespace) -> ConfigError:
-    """Return an error that names the flag."""
-    flag = flags.flag_of(error, chosen)
-    return ConfigError(_FLAG_OF.get(flag, flag), error.value, error.allowed)
+    return run_program(parser(prog), partial(_run, words=words), words, in_flags=flags.in_flags)
 
 
 def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
@@ -193,7 +172,7 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
         correlations=study_flags.pairs(listed(chosen, 'correlation')),
         count=getattr(chosen, 'count', DEFAULT_COUNT if scatter else 1),
         seed=chosen.seed,
-        sampling='sobol' if chosen.sobol else 'random',
+        sampling=chosen.sampling,
         gusts=chosen.gust_seeds,
         duration=chosen.duration,
         ground=not chosen.no_ground,

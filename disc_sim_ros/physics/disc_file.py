@@ -21,6 +21,7 @@ from disc_sim_ros.physics.disc import AERODYNAMICS, AeroTable, Disc, LinearAero,
 from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
 from disc_sim_ros.validation import Quantity
 
+DEFAULT_DISC = 'frisbee'
 _FOLDER = files('disc_sim_ros.physics') / 'discs'
 _LONGEST_NAME = 100  # of a file, in a message
 _LARGEST_FILE = 1 << 17  # bytes; the largest disc of the package has 4 kB, and 1 MB takes seconds

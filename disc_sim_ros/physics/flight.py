@@ -35,7 +35,6 @@ from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT, DURATION, SAMPLE_RA
 MODELS = {'exact': EXACT, 'constant_spin': CONSTANT_SPIN, 'precession': PRECESSION}
 MOMENT_AXES = {'body': BODY, 'wind': WIND}
 NO_CONTROL = Control()
-LONGEST = DURATION.highest
 MOST_SAMPLES = 5_000_000
 
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.quantities import STUDY
 
 THREADS, PROCESSES, DASK = 'threads', 'processes', 'dask'
-MOST_WORKERS = 1024
 _PATIENCE = 10.0  # s, longest wait for an answer of a Dask scheduler
 
 
@@ -34,7 +34,7 @@ def opened(name: str, workers: int | None = None) -> Iterator[tuple[Executor | N
     kind, has_address, address = name.partition('=')
     validation.choice('executor', kind, (THREADS, PROCESSES, DASK))
     count = os.process_cpu_count() if hasattr(os, 'process_cpu_count') else os.cpu_count()
-    wanted = validation.whole_number('workers', workers or count or 1, 1, MOST_WORKERS)
+    wanted = STUDY['workers'].check(workers or count or 1)
     if has_address and kind != DASK:
         raise ConfigError('executor', name, f'{kind} takes no address')
     if kind == THREADS:

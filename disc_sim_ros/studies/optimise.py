@@ -15,6 +15,7 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.ensemble import Landings, fly_many
 from disc_sim_ros.physics.kernels.integrator import LOST
+from disc_sim_ros.quantities import STUDY
 from disc_sim_ros.studies.columns import ADVANCE_RATIO, LAUNCH, quantity
 from disc_sim_ros.studies.flying import kernel_values
 from disc_sim_ros.studies.scatter import Normal, quantiles
@@ -63,20 +64,20 @@ class Problem:
         for name, (low, high) in self.limits.items():
             if name not in {*LAUNCH, ADVANCE_RATIO}:
                 allowed = f'free may be {", ".join(LAUNCH)} and {ADVANCE_RATIO}'
-                raise ConfigError(f'limit {name}', 'free', allowed)
+                raise ConfigError(f'limits {name}', 'free', allowed)
             lowest, highest = self.study.bounds(quantity('limits', name).name)
             if not lowest <= low < high <= highest:
                 allowed = f'from {lowest:g} to {highest:g}, the lower limit first'
-                raise ConfigError(f'limit {name}', [low, high], allowed)
+                raise ConfigError(f'limits {name}', [low, high], allowed)
         for name, law in self.study.scatter.items():
             if not isinstance(law, Normal) or law.mean is not None:
                 raise ConfigError(f'scatter {name}', str(law), 'give a standard deviation only')
         if self.percentile is not None:
-            validation.number('percentile', self.percentile, 1.0, 99.0)
+            STUDY['percentile'].check(self.percentile)
             if not self.scatters:
                 raise ConfigError('percentile', self.percentile, 'no quantity scatters')
         if 'spin' in self.limits and self.study.advance_ratio is not None:
-            raise ConfigError('limit spin', 'free', 'the advance ratio determines it')
+            raise ConfigError('limits spin', 'free', 'the advance ratio determines it')
 
     @property
     def free(self) -> tuple[str, ...]:

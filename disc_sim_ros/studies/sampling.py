@@ -10,7 +10,6 @@ from disc_sim_ros.arrays import FloatArray
 
 RANDOM, SOBOL = 'random', 'sobol'
 METHODS = (RANDOM, SOBOL)
-MOST_SAMPLES = 2**30
 _BLOCK = 4096  # samples per value of the counter
 _BITS = 30  # binary digits of a Sobol number, as in scipy
 _SCRAMBLING = 2**63  # Philox keys from here on are for scrambles, lower ones for samples

@@ -16,7 +16,7 @@ from disc_sim_ros.errors import ConfigError, brief
 from disc_sim_ros.physics import disc_file, flight, frames, theory
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.quantities import DURATION, LARGEST_SEED
+from disc_sim_ros.quantities import DURATION, LARGEST_SEED, STUDY
 from disc_sim_ros.studies import sampling
 from disc_sim_ros.studies.columns import (
     ADVANCE_RATIO,
@@ -71,16 +71,16 @@ class Study:
     vary: Mapping[str, Sequence[float]] = field(default_factory=dict)
     scatter: Mapping[str, Normal | Uniform] = field(default_factory=dict)
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    count: int = 1
-    seed: int = 0
+    count: int = STUDY['count'].default
+    seed: int = STUDY['scatter_seed'].default
     sampling: str = sampling.RANDOM
     gusts: str = EACH
     duration: float = DURATION.default
     ground: bool = True
 
     def __post_init__(self) -> None:
-        validation.whole_number('count', self.count, 1, sampling.MOST_SAMPLES)
-        validation.whole_number('seed', self.seed, 0, LARGEST_SEED)
+        STUDY['count'].check(self.count)
+        STUDY['scatter_seed'].check(self.seed, 'seed')
         validation.choice('sampling', self.sampling, sampling.METHODS)
         validation.choice('gusts', self.gusts, GUSTS)
         self._check_names()

@@ -75,12 +75,14 @@ def test_bad_input_ends_with_code_2_and_one_line(capsys, body, arguments, line):
 
 
 def test_an_error_is_reported_in_the_words_of_the_command_line(capsys):
-    def in_flags(error, chosen):
-        return ConfigError(f'--{error.thing} at {chosen.speed:g}', error.value, error.allowed)
+    def in_flags(error, chosen, parser):
+        return error.named(f'{parser.prog} --{error.thing} at {chosen.speed:g}')
 
     with pytest.raises(SystemExit):
         run(raising(ConfigError('mass', 3.0, 'at most 1')), '--speed', '7', in_flags=in_flags)
-    assert capsys.readouterr().err == 'thrower: error: --mass at 7: 3 is not allowed; at most 1\n'
+    assert capsys.readouterr().err == (
+        'thrower: error: thrower --mass at 7: 3 is not allowed; at most 1\n'
+    )
 
 
 @pytest.mark.parametrize('arguments', [('fly', '--help'), ('disc-sim', '--help'), ('fly',)])

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from disc_sim_ros.physics.disc import AERODYNAMICS
-from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES
+from disc_sim_ros.physics.disc_file import DEFAULT_DISC
+from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, Setup
 from disc_sim_ros.quantities import AIR, IMU, LAUNCH, TIMING, WIND
 from disc_sim_ros.ros.parameter_spec import Effect, ParameterSpec, spec_of
 from disc_sim_ros.topics import Frames
@@ -44,13 +45,15 @@ GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
     'Disc and model': (
         ParameterSpec(
             'disc',
-            'frisbee',
+            DEFAULT_DISC,
             'next throw',
             'The disc: a name of the catalogue, or the path of a disc file.',
             constraint='a file ends in .yaml or .yml; a relative path starts at the folder in '
             'which the node was started',
         ),
-        ParameterSpec('model', 'exact', 'next throw', 'Rigid-body model.', choices=tuple(MODELS)),
+        ParameterSpec(
+            'model', Setup.model, 'next throw', 'Rigid-body model.', choices=tuple(MODELS)
+        ),
         ParameterSpec(
             'aero',
             '',
@@ -61,7 +64,7 @@ GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
         ),
         ParameterSpec(
             'moment_axes',
-            'body',
+            Setup.moment_axes,
             'next throw',
             "Axes of the moment coefficients: the paper's axes 3 (body) or 4 (wind).",
             choices=tuple(MOMENT_AXES),
