@@ -115,7 +115,7 @@ def bag(folder: Path, data: list[bytes]) -> Path:
     topic = Topic(
         name='/odom',
         type=TYPE,
-        definition=schemas.definition(TYPE) or '',
+        definition=schemas.definition(TYPE),
         type_hash=schemas.type_hash(TYPE) or '',
         qos=(Qos(depth=1000),),
     )

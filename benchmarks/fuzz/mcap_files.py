@@ -42,7 +42,7 @@ def _ours(compression: str) -> bytes:
                 Topic(
                     name=name,
                     type=kind,
-                    definition=schemas.definition(kind) or '',
+                    definition=schemas.definition(kind),
                     type_hash=schemas.type_hash(kind) or '',
                     qos=(Qos(depth=3),),
                 )

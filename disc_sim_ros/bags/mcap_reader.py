@@ -1,5 +1,6 @@
-"""The index at the end of an MCAP file."""
+"""The index at the end of an MCAP file: what the file holds without reading all of it."""
 
+from dataclasses import dataclass, field
 from pathlib import Path
 import struct
 from typing import BinaryIO
@@ -10,18 +11,24 @@ from mcap.records import (
     AttachmentIndex,
     Channel,
     ChunkIndex,
+    Header,
+    McapRecord,
     Metadata,
     MetadataIndex,
     Schema,
     Statistics,
 )
 
-from disc_sim_ros.bags.mcap_records import HEAD, MAGIC, Chunk, Contents, parsed, records
+from disc_sim_ros.bags.contents import Chunk, Contents
+from disc_sim_ros.bags.mcap_records import HEAD, MAGIC, parsed, records
 from disc_sim_ros.errors import DamageError
 
 _FOOTER = struct.Struct('<BQQQI')  # opcode, length, start of summary, of offsets, checksum
 _TAIL = _FOOTER.size + len(MAGIC)
-_KINDS = {
+_DATA_END_SIZE = HEAD.size + 4
+_LARGEST_METADATA = 1 << 28  # bytes
+_FIRST_PRIVATE = 0x80  # opcode
+_KINDS: dict[int, type[McapRecord]] = {
     int(Opcode.SCHEMA): Schema,
     int(Opcode.CHANNEL): Channel,
     int(Opcode.STATISTICS): Statistics,
@@ -31,76 +38,166 @@ _KINDS = {
 }
 
 
-def indexed(path: Path) -> Contents | None:
-    """Return what a file holds by its index, or None where it has none that can be trusted.
+def indexed(path: Path, unpacked: Path | None = None) -> Contents | None:
+    """Return what a file holds by its index; None where it has none that tells of everything.
+
+    Args:
+        path: The file.
+        unpacked: Where its plain bytes are, if it is compressed as a whole.
 
     Raises:
         OSError: It cannot be read.
     """
-    with path.open('rb') as file:
+    contents = Contents(path, unpacked)
+    with contents.data_path.open('rb') as file:
         try:
-            return _contents(path, file)
+            return contents if _Index(file).fill(contents) else None
         except DamageError:
             return None
 
 
-def _contents(path: Path, file: BinaryIO) -> Contents | None:
-    size = file.seek(0, 2)
-    summary = _summary(file, size)
-    if summary is None:
-        return None
-    contents = Contents(path, complete=True)
+@dataclass(slots=True)
+class _Summary:
+    """The records of the summary section, and where they begin."""
+
+    at: int
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
     statistics: Statistics | None = None
-    for opcode, at, length in records(summary):
-        if opcode not in _KINDS:
-            continue
-        record = parsed(_KINDS[opcode], summary[at : at + length])
-        match record:
-            case Schema():
-                contents.schemas[record.id] = record
-            case Channel():
-                contents.channels[record.id] = record
-            case Statistics():
-                statistics = record
-            case ChunkIndex():
-                contents.pieces.append(_piece(record, size))
-            case AttachmentIndex():
-                contents.attachments.append(record.offset)
-            case MetadataIndex():
-                contents.metadata.append(_metadata(file, record))
-    if statistics is None or (statistics.message_count and not contents.pieces):
-        return None
-    contents.counts = dict(statistics.channel_message_counts)
-    if any(
-        c.schema_id and c.schema_id not in contents.schemas for c in contents.channels.values()
-    ):
-        return None
-    return contents if contents.counts.keys() <= contents.channels.keys() else None
+    chunks: list[ChunkIndex] = field(default_factory=list)
+    attachments: list[AttachmentIndex] = field(default_factory=list)
+    metadata: list[MetadataIndex] = field(default_factory=list)
+
+    def tells_of_everything(self) -> bool:
+        """Return True if nothing that the statistics count is without an entry."""
+        s = self.statistics
+        if s is None:
+            return False
+        return (
+            s.message_count == sum(s.channel_message_counts.values())
+            and s.chunk_count == len(self.chunks)
+            and s.attachment_count == len(self.attachments)
+            and s.metadata_count == len(self.metadata)
+            and s.channel_count == len(self.channels)
+            and s.channel_message_counts.keys() <= self.channels.keys()
+            and all(
+                c.schema_id == 0 or c.schema_id in self.schemas for c in self.channels.values()
+            )
+        )
 
 
-def _summary(file: BinaryIO, size: int) -> bytes | None:
-    if size < len(MAGIC) + _TAIL:
-        return None
-    file.seek(0)
-    if file.read(len(MAGIC)) != MAGIC:
-        return None
-    file.seek(size - _TAIL)
-    tail = file.read(_TAIL)
-    opcode, length, start, _, crc = _FOOTER.unpack_from(tail)
-    if opcode != Opcode.FOOTER or length != _FOOTER.size - HEAD.size or tail[-8:] != MAGIC:
-        return None
-    if not len(MAGIC) < start <= size - _TAIL:
-        return None
-    file.seek(start)
-    summary = file.read(size - _TAIL - start)
-    if crc and zlib.crc32(tail[: _FOOTER.size - 4], zlib.crc32(summary)) != crc:
-        return None
-    return summary
+class _Index:
+    """Reads the summary of one file and compares it with the data section."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._size = file.seek(0, 2)
+
+    def fill(self, contents: Contents) -> bool:
+        """Put in what the index tells; return False if it does not tell of everything.
+
+        Raises:
+            DamageError: The index or a record in the data section is no such record.
+        """
+        summary = self._summary()
+        if summary is None or not summary.tells_of_everything():
+            return False
+        if not self._walk(summary, contents):
+            return False
+        contents.schemas, contents.channels = summary.schemas, summary.channels
+        contents.chunks = [_chunk(c) for c in summary.chunks]
+        contents.attachments = [a.offset for a in summary.attachments]
+        contents.metadata = [self._metadata(m) for m in summary.metadata]
+        assert summary.statistics is not None  # noqa: S101 - for mypy
+        contents.counts = dict(summary.statistics.channel_message_counts)
+        contents.complete = True
+        return True
+
+    def _read(self, at: int, size: int) -> bytes:
+        self._file.seek(at)
+        return self._file.read(size)
+
+    def _summary(self) -> _Summary | None:
+        if self._size < len(MAGIC) + _TAIL or self._read(0, len(MAGIC)) != MAGIC:
+            return None
+        tail_at = self._size - _TAIL
+        tail = self._read(tail_at, _TAIL)
+        opcode, length, start, _, crc = _FOOTER.unpack_from(tail)
+        if opcode != Opcode.FOOTER or length != _FOOTER.size - HEAD.size:
+            return None
+        if tail[-len(MAGIC) :] != MAGIC or not len(MAGIC) < start <= tail_at:
+            return None
+        content = self._read(start, tail_at - start)
+        if crc and zlib.crc32(tail[: _FOOTER.size - 4], zlib.crc32(content)) != crc:
+            return None
+        summary = _Summary(start)
+        for kind, at, size in records(content):
+            if kind in _KINDS:
+                _sort_in(summary, parsed(_KINDS[kind], content[at : at + size]))
+        return summary
+
+    def _walk(self, summary: _Summary, contents: Contents) -> bool:
+        """Go over the data section from record to record, without reading the chunks.
+
+        Returns:
+            False if a message or a chunk is not in the index, or something is not where it says.
+        """
+        ends = {
+            c.chunk_start_offset: c.chunk_start_offset + c.chunk_length + c.message_index_length
+            for c in summary.chunks
+        }
+        ends |= {a.offset: a.offset + a.length for a in summary.attachments}
+        ends |= {m.offset: m.offset + m.length for m in summary.metadata}
+        at = len(MAGIC)
+        while at <= summary.at - _DATA_END_SIZE:
+            if at in ends:
+                at = _later(at, ends.pop(at))
+                continue
+            opcode, length = HEAD.unpack(self._read(at, HEAD.size))
+            if opcode == Opcode.DATA_END:
+                return not ends
+            if opcode in {0, Opcode.MESSAGE, Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA}:
+                return False
+            if opcode == Opcode.HEADER:
+                header = parsed(Header, self._read(at + HEAD.size, min(length, self._size)))
+                contents.profile = getattr(header, 'profile', None)
+            if opcode >= _FIRST_PRIVATE:
+                contents.private.append((at, HEAD.size + length))
+            at += HEAD.size + length
+        return False
+
+    def _metadata(self, index: MetadataIndex) -> Metadata:
+        content = self._read(index.offset, min(index.length, _LARGEST_METADATA))
+        if not content or content[0] != Opcode.METADATA:
+            raise DamageError('there is no metadata where the index says')
+        record = parsed(Metadata, content[HEAD.size :])
+        assert isinstance(record, Metadata)  # noqa: S101 - for mypy
+        return record
 
 
-def _piece(record: ChunkIndex, size: int) -> Chunk:
-    if record.chunk_start_offset + record.chunk_length > size or record.chunk_length < HEAD.size:
-        raise DamageError('the index tells of a chunk beyond the end')
+def _sort_in(summary: _Summary, record: McapRecord) -> None:
+    match record:
+        case Schema():
+            summary.schemas[record.id] = record
+        case Channel():
+            summary.channels[record.id] = record
+        case Statistics():
+            summary.statistics = record
+        case ChunkIndex():
+            summary.chunks.append(record)
+        case AttachmentIndex():
+            summary.attachments.append(record)
+        case MetadataIndex():
+            summary.metadata.append(record)
+
+
+def _later(at: int, end: int) -> int:
+    if end <= at:
+        raise DamageError('the index states a length that cannot be')
+    return end
+
+
+def _chunk(record: ChunkIndex) -> Chunk:
     channels = frozenset(record.message_index_offsets) if record.message_index_offsets else None
     return Chunk(
         record.chunk_start_offset,
@@ -109,13 +206,3 @@ def _piece(record: ChunkIndex, size: int) -> Chunk:
         record.message_end_time,
         channels,
     )
-
-
-def _metadata(file: BinaryIO, index: MetadataIndex) -> Metadata:
-    file.seek(index.offset)
-    content = file.read(min(index.length, 1 << 28))
-    if not content or content[0] != Opcode.METADATA:
-        raise DamageError('there is no metadata where the index says')
-    record = parsed(Metadata, content[HEAD.size :])
-    assert isinstance(record, Metadata)  # noqa: S101 - for mypy
-    return record

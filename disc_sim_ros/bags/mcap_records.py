@@ -1,29 +1,34 @@
-"""What an MCAP file holds, found by its index or, without one, by reading it all."""
+"""Records of the MCAP format, parsed from bytes: messages, chunks, attachments.
+
+Records may be longer than their fields, all but Message, DataEnd and Footer; what follows the
+known fields is ignored, as the specification demands.
+"""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import BytesIO
-from pathlib import Path
 import struct
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 import zlib
 
 import lz4.frame  # type: ignore[import-untyped]
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, McapRecord, Metadata, Schema
+from mcap.records import Attachment, McapRecord
 import zstandard
 
 from disc_sim_ros.errors import DamageError
 
 MAGIC = b'\x89MCAP0\r\n'
 HEAD = struct.Struct('<BQ')  # opcode and length of a record
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'  # at the beginning of a frame
+LZ4_MAGIC = b'\x04\x22\x4d\x18'
 _MESSAGE = struct.Struct('<HIQQ')  # channel, sequence, log time, publish time
 _CHUNK = struct.Struct('<QQQI')  # start, end, plain size, checksum
 _CHUNK_FIELDS = 40  # bytes of a chunk record beside the name of its compression and the data
-_COMPRESSIONS = (b'', b'zstd', b'lz4')
-_MOST_PLAIN = 1 << 32  # bytes of a chunk, a bound against damaged sizes
+COMPRESSION_MAGICS = {b'': b'', b'zstd': ZSTD_MAGIC, b'lz4': LZ4_MAGIC}  # of chunks
+_LARGEST_CHUNK = 1 << 32  # bytes of plain data, a bound against damaged sizes
 
 
 class Stored(NamedTuple):
@@ -34,56 +39,6 @@ class Stored(NamedTuple):
     log_time: int  # ns
     publish_time: int  # ns
     data: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Chunk:
-    """A part of a file that holds messages: the content of a chunk, or records outside of one."""
-
-    offset: int  # of the chunk record, or of the first record
-    length: int  # with the head of the record
-    start: int  # least log time [ns]
-    end: int
-    channels: frozenset[int] | None  # those with messages; None: not known
-    chunk: bool = True
-    cut: bool = False  # the end is missing
-
-
-@dataclass(frozen=True, slots=True)
-class Loss:
-    """Bytes of a file that say nothing any more."""
-
-    path: Path
-    offset: int
-    length: int
-    reason: str
-    messages: int | None = None  # None: not known
-
-    def __str__(self) -> str:
-        count = '' if self.messages is None else f', {self.messages} messages'
-        return (
-            f'{self.path.name}: {self.length} bytes from byte {self.offset}{count}: {self.reason}'
-        )
-
-
-@dataclass(slots=True)
-class Contents:
-    """What one file holds. Times are log times [ns]."""
-
-    path: Path
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    pieces: list[Chunk] = field(default_factory=list)
-    counts: dict[int, int] = field(default_factory=dict)  # messages by channel id
-    attachments: list[int] = field(default_factory=list)  # offsets
-    metadata: list[Metadata] = field(default_factory=list)
-    losses: list[Loss] = field(default_factory=list)
-    complete: bool = False  # it has its end, and nothing was seen to be damaged
-
-    @property
-    def message_count(self) -> int:
-        """Messages of all channels."""
-        return sum(self.counts.values())
 
 
 def parsed(kind: type[McapRecord], content: bytes) -> McapRecord:
@@ -117,7 +72,7 @@ def records(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def messages(data: bytes, wanted: frozenset[int] | None = None) -> Iterator[Stored]:
-    """Yield the messages in plain data.
+    """Yield the messages in plain data, of all channels or of those wanted.
 
     Raises:
         DamageError: The last record is not whole.
@@ -131,6 +86,36 @@ def messages(data: bytes, wanted: frozenset[int] | None = None) -> Iterator[Stor
                 channel_id, sequence, log_time, publish_time = fields
                 payload = data[at + _MESSAGE.size : at + length]
                 yield Stored(channel_id, sequence, log_time, publish_time, payload)
+
+
+def whole_records(data: bytes) -> bytes:
+    """Return the beginning of plain data up to the end of its last whole record."""
+    end = 0
+    try:
+        for _, at, length in records(data):
+            end = at + length
+    except DamageError:
+        pass
+    return data[:end]
+
+
+def parsed_attachment(content: bytes) -> Attachment:
+    """Return an attachment whose checksum agrees.
+
+    Raises:
+        DamageError: It does not.
+    """
+    record = parsed(Attachment, content)
+    assert isinstance(record, Attachment)  # noqa: S101 - for mypy
+    sizes = len(record.name.encode()), len(record.media_type.encode()), len(record.data)
+    end = 8 + 8 + 4 + sizes[0] + 4 + sizes[1] + 8 + sizes[2]
+    crc = int.from_bytes(content[end : end + 4], 'little')
+    if crc and zlib.crc32(content[:end]) != crc:
+        raise DamageError('the checksum of an attachment disagrees')
+    return record
+
+
+# ---- chunks ----
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,19 +132,24 @@ class ChunkHead:
     def of(cls, content: bytes, length: int) -> 'ChunkHead':
         """Read the beginning of a record with content of `length` bytes.
 
+        Args:
+            content: Its first bytes; 64 are enough.
+            length: As the record states it.
+
         Raises:
-            DamageError: The lengths that it states disagree.
+            DamageError: It is no chunk, or the lengths that it states disagree.
         """
         try:
             _, _, plain_size, crc = _CHUNK.unpack_from(content, 0)
             (name_size,) = struct.unpack_from('<I', content, _CHUNK.size)
             name = content[_CHUNK.size + 4 : _CHUNK.size + 4 + min(name_size, 8)]
-            (data_size,) = struct.unpack_from('<Q', content, _CHUNK.size + 4 + len(name))
+            data_at = _CHUNK_FIELDS + len(name)
+            (data_size,) = struct.unpack_from('<Q', content, data_at - 8)
         except struct.error:
             raise DamageError('a chunk is cut off') from None
-        if name not in _COMPRESSIONS or length != _CHUNK_FIELDS + len(name) + data_size:
+        if name not in COMPRESSION_MAGICS or length < data_at + data_size:
             raise DamageError('a chunk states lengths that disagree')
-        return cls(plain_size, crc, name, _CHUNK_FIELDS + len(name), data_size)
+        return cls(plain_size, crc, name, data_at, data_size)
 
 
 def chunk_data(content: bytes) -> bytes:
@@ -169,9 +159,9 @@ def chunk_data(content: bytes) -> bytes:
         DamageError: It cannot be decompressed, or is not what its checksum says.
     """
     head = ChunkHead.of(content, len(content))
-    plain = _decompress(head, content[head.data_at :])
+    plain = _decompress(head, content[head.data_at : head.data_at + head.data_size])
     if len(plain) != head.plain_size:
-        raise DamageError('a chunk is shorter than it says')
+        raise DamageError('a chunk has another size than it states')
     if head.crc and zlib.crc32(plain) != head.crc:
         raise DamageError('the checksum of a chunk disagrees')
     return plain
@@ -182,81 +172,62 @@ def cut_chunk_data(content: bytes) -> bytes:
     try:
         (length,) = struct.unpack_from('<Q', content, 1)
         head = ChunkHead.of(content[HEAD.size :], length)
-        plain = _decompress(head, content[HEAD.size + head.data_at :])
+        start = HEAD.size + head.data_at
+        plain = _decompress(head, content[start : start + head.data_size])
     except (DamageError, struct.error):
         return b''
     return whole_records(plain)
 
 
-def whole_records(data: bytes) -> bytes:
-    """Return the beginning of plain data up to the end of its last whole record."""
-    end = 0
+def decompress_zstd(data: bytes, limit: int = _LARGEST_CHUNK) -> bytes:
+    """Return what the frames of zstd hold, one behind the other; of a cut frame its beginning.
+
+    Raises:
+        DamageError: They cannot be decompressed, or to more than `limit` bytes.
+    """
+    parts = []
     try:
-        for _, at, length in records(data):
-            end = at + length
-    except DamageError:
-        pass
-    return data[:end]
+        while data:
+            frame = zstandard.ZstdDecompressor().decompressobj()
+            parts.append(frame.decompress(data))
+            data = frame.unused_data
+            limit -= len(parts[-1])
+            _check_limit(limit)
+    except (zstandard.ZstdError, MemoryError) as error:
+        raise DamageError(f'the data cannot be decompressed ({error})') from None
+    return parts[0] if len(parts) == 1 else b''.join(parts)
 
 
-def chunk_bytes(file: BinaryIO, piece: Chunk) -> bytes:
-    """Return the plain data of a piece of an open file.
-
-    Raises:
-        DamageError: It is damaged.
-        OSError: It cannot be read.
-    """
-    file.seek(piece.offset)
-    stored = file.read(piece.length)
-    if len(stored) < piece.length:
-        raise DamageError('the file ends early')
-    if not piece.chunk:
-        return stored
-    if piece.cut:
-        return cut_chunk_data(stored)
-    if stored[0] != Opcode.CHUNK:
-        raise DamageError('there is no chunk where the index says')
-    return chunk_data(stored[HEAD.size :])
-
-
-def attachment_at(file: BinaryIO, offset: int) -> Attachment:
-    """Return an attachment of an open file.
+def decompress_lz4(data: bytes, limit: int = _LARGEST_CHUNK) -> bytes:
+    """Return what the frames of lz4 hold, as `decompress_zstd` does.
 
     Raises:
-        DamageError: It is damaged.
-        OSError: It cannot be read.
+        DamageError: As there.
     """
-    file.seek(offset)
-    head = file.read(HEAD.size)
-    if len(head) < HEAD.size or head[0] != Opcode.ATTACHMENT:
-        raise DamageError('there is no attachment where the index says')
-    return parsed_attachment(file.read(HEAD.unpack(head)[1]))
+    parts = []
+    try:
+        while data:
+            frame = lz4.frame.LZ4FrameDecompressor()
+            parts.append(bytes(frame.decompress(data)))
+            data = frame.unused_data or b''
+            limit -= len(parts[-1])
+            _check_limit(limit)
+    except (RuntimeError, MemoryError, ValueError) as error:
+        raise DamageError(f'the data cannot be decompressed ({error})') from None
+    return parts[0] if len(parts) == 1 else b''.join(parts)
 
 
-def parsed_attachment(content: bytes) -> Attachment:
-    """Return an attachment whose checksum agrees.
-
-    Raises:
-        DamageError: It does not.
-    """
-    crc = int.from_bytes(content[-4:], 'little')
-    if crc and zlib.crc32(content[:-4]) != crc:
-        raise DamageError('the checksum of an attachment disagrees')
-    record = parsed(Attachment, content)
-    assert isinstance(record, Attachment)  # noqa: S101 - for mypy
-    return record
+def _check_limit(rest: int) -> None:
+    if rest < 0:
+        raise DamageError('a chunk has another size than it states')
 
 
 def _decompress(head: ChunkHead, data: bytes) -> bytes:
-    """Return what comes out of the data of a chunk, all of it or its beginning."""
-    if head.plain_size > _MOST_PLAIN:
+    """Return the plain data of a chunk, all of it or its beginning."""
+    if head.plain_size > _LARGEST_CHUNK:
         raise DamageError('a chunk states a size that cannot be')
-    try:
-        if head.compression == b'zstd':
-            return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        if head.compression == b'lz4':
-            plain = lz4.frame.LZ4FrameDecompressor().decompress(data)
-            return bytes(plain)
-    except (zstandard.ZstdError, RuntimeError, MemoryError, ValueError) as error:
-        raise DamageError(f'a chunk cannot be decompressed ({error})') from None
+    if head.compression == b'zstd':
+        return decompress_zstd(data, head.plain_size)
+    if head.compression == b'lz4':
+        return decompress_lz4(data, head.plain_size)
     return data

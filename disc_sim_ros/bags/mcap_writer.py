@@ -4,20 +4,17 @@ The records are those of the `mcap` package. Its `Writer` is not used: it counts
 to write, so that after a full disk its index would tell of chunks that are not there.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from pathlib import Path
 import struct
 import time
 import zlib
 
 import lz4.frame  # type: ignore[import-untyped]
-from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
-    Channel,
     Chunk,
     ChunkIndex,
     DataEnd,
@@ -26,7 +23,6 @@ from mcap.records import (
     McapRecord,
     Metadata,
     MetadataIndex,
-    Schema,
     Statistics,
     SummaryOffset,
 )
@@ -34,8 +30,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, MCAP0_MAGIC
 import zstandard
 
 from disc_sim_ros import __version__, files
-from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.topic import Topic, qos_yaml
+from disc_sim_ros.bags.definitions import Definition, record_bytes
 from disc_sim_ros.errors import BagError
 
 CHUNK_SIZE = 768 * 1024  # bytes before compression, as the C++ library
@@ -47,44 +42,16 @@ _MESSAGE_FIELDS = 22  # bytes of a message record before its data
 _FOOTER = struct.Struct('<BQQQ').pack
 
 
-@dataclass(frozen=True, slots=True)
-class Definition:
-    """A channel and its schema, ready to be written into any file of the bag."""
-
-    channel: Channel
-    schema: Schema
-    packed: bytes  # the records, schema first
-
-    @classmethod
-    def of(cls, topic: Topic, channel_id: int, schema_id: int) -> 'Definition':
-        """Return the records of a topic."""
-        # Only of a message without fields is '' the definition.
-        found = topic.definition or schemas.definition(topic.type) == ''
-        channel = Channel(
-            id=channel_id,
-            topic=topic.name,
-            message_encoding=topic.serialization_format,
-            metadata={
-                'offered_qos_profiles': qos_yaml(topic.qos),
-                'topic_type_hash': topic.type_hash,
-                **dict(topic.extra),
-            },
-            schema_id=schema_id,
-        )
-        schema = Schema(
-            id=schema_id,
-            name=topic.type,
-            encoding=topic.definition_encoding if found else 'unknown',  # rosbag2's word
-            data=topic.definition.encode(errors='surrogateescape'),
-        )
-        return cls(channel, schema, _bytes_of(schema) + _bytes_of(channel))
-
-
 class McapFile:
-    """An MCAP file in the making; only what the system took is counted."""
+    """An MCAP file that is being written; it counts only what the system took."""
 
-    def __init__(self, path: Path, compression: str) -> None:
+    def __init__(self, path: Path, compression: str, profile: str = 'ros2') -> None:
         """Make the file and write its header.
+
+        Args:
+            path: Must not exist.
+            compression: Of the chunks: one of `COMPRESSIONS`.
+            profile: Of the header.
 
         Raises:
             OSError: The system refuses.
@@ -92,6 +59,7 @@ class McapFile:
         self.counts: dict[int, int] = {}  # channel id: messages written
         self.start = 0  # least log time written [ns]
         self.end = 0  # greatest
+        self.duration = 0  # of the chunks written, added up [ns]
         self.finished = False  # it has its end
         self._compress = _compressor(compression)
         self._compression = '' if compression == 'none' else compression
@@ -102,11 +70,11 @@ class McapFile:
         self._metadata: list[MetadataIndex] = []
         self._attachments: list[AttachmentIndex] = []
         self._new: list[int] = []  # channels first defined in the open chunk
-        self._near: set[int] = set()  # channels defined since the last doubling of the chunks
+        self._recent: set[int] = set()  # channels defined since the last doubling of the chunks
         self._file = files.GrowingFile(path)
         try:
-            header = Header('ros2', f'disc_sim_ros {__version__}, {LIBRARY_IDENTIFIER}')
-            self._file.append(MCAP0_MAGIC + _bytes_of(header))
+            header = Header(profile, f'disc_sim_ros {__version__}, {LIBRARY_IDENTIFIER}')
+            self._file.append(MCAP0_MAGIC + record_bytes(header))
         except OSError:
             self._file.close()
             path.unlink(missing_ok=True)
@@ -137,14 +105,15 @@ class McapFile:
         return sum(self.counts.values())
 
     def closing_size(self, definitions: int) -> int:
-        """Return the bytes that the end of the file may take, beside the metadata record.
+        """Return the bytes that the end of the file may take, without the metadata record.
 
         Args:
-            definitions: Bytes of all definitions of the bag.
+            definitions: Bytes of all definitions of the bag, which the data section and the
+                summary may need.
         """
         per_chunk = 128 + 10 * len(self._defined)
         named = 256 * (len(self._metadata) + len(self._attachments))
-        return definitions + per_chunk * (len(self._chunks) + 2) + named + 4096
+        return 2 * definitions + per_chunk * (len(self._chunks) + 2) + named + 4096
 
     def write(
         self,
@@ -154,7 +123,7 @@ class McapFile:
         publish_time: int,
         sequence: int,
     ) -> int:
-        """Add a message to the open chunk and return the size of that.
+        """Add a message to the open chunk and return the size of the chunk.
 
         Raises:
             struct.error: A time is not from 0 to 2^64 - 1.
@@ -184,19 +153,45 @@ class McapFile:
             self._new = []
             self._chunk, self._index = bytearray(), {}
             if len(self._chunks).bit_count() == 1:
-                # Definitions come again in the chunk after the 1st, 2nd, 4th, 8th, ...: without
-                # its end a file would be worth nothing once its first chunk is damaged.
-                self._near.clear()
+                # Definitions are repeated in the chunk after the 1st, 2nd, 4th, 8th, ...: else a
+                # file without its end could not be read once its first chunk is damaged.
+                self._recent.clear()
 
     def drop_chunk(self) -> int:
-        """Forget the open chunk; return how many messages that costs."""
+        """Discard the open chunk; return how many messages it had."""
         dropped = self.pending_messages
         for channel_id in self._new:  # to be defined again in the next chunk
             del self._defined[channel_id]
-        self._near.clear()
+        self._recent.clear()
         self._new = []
         self._chunk, self._index = bytearray(), {}
         return dropped
+
+    def define(self, definitions: Iterable[Definition]) -> None:
+        """Write definitions that the file does not have yet, as of topics without messages.
+
+        Raises:
+            OSError: The system refuses.
+        """
+        schemas = {d.schema.id for d in self._defined.values() if d.schema is not None}
+        for definition in definitions:
+            if definition.channel.id in self._defined:
+                continue
+            schema, packed = definition.schema, definition.packed
+            if schema is not None and schema.id in schemas:
+                packed = record_bytes(definition.channel)
+            elif schema is not None:
+                schemas.add(schema.id)
+            self._file.append(packed)
+            self._defined[definition.channel.id] = definition
+
+    def add_record(self, packed: bytes) -> None:
+        """Write a record of another program as it is.
+
+        Raises:
+            OSError: The system refuses.
+        """
+        self._file.append(packed)
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Write a metadata record.
@@ -204,7 +199,7 @@ class McapFile:
         Raises:
             OSError: The system refuses.
         """
-        record = _bytes_of(Metadata(name=name, metadata=data))
+        record = record_bytes(Metadata(name=name, metadata=data))
         offset = self._file.size
         self._file.append(record)
         self._metadata.append(MetadataIndex(offset=offset, length=len(record), name=name))
@@ -215,7 +210,7 @@ class McapFile:
         Raises:
             OSError: The system refuses.
         """
-        record = _bytes_of(attachment)
+        record = record_bytes(attachment)
         offset = self._file.size
         self._file.append(record)
         self._attachments.append(
@@ -234,43 +229,41 @@ class McapFile:
         """Wait until the disk has what was written."""
         self._file.sync()
 
-    def finish(self, others: Sequence[Definition] = ()) -> None:
-        """Write the end: the index of all that was written, and channels without messages.
+    def finish(self) -> None:
+        """Write the end: the summary with the index of all that was written.
 
         Raises:
-            OSError: The system refuses; the file has no end but holds all it held.
+            OSError: The system refuses; the file has no end but holds all that it held.
         """
-        for definition in others:
-            self._defined.setdefault(definition.channel.id, definition)
-        data_end = _bytes_of(DataEnd(0))  # as rosbag2: no checksum of the whole
+        data_end = record_bytes(DataEnd(0))  # as rosbag2: no checksum of the whole
         summary_start = self._file.size + len(data_end)
         summary = bytearray()
         offsets = []
         for opcode, records in self._summary():
             start = len(summary)
             for record in records:
-                summary += _bytes_of(record)
+                summary += record_bytes(record)
             if records:
                 offsets.append(SummaryOffset(opcode, summary_start + start, len(summary) - start))
         offset_start = summary_start + len(summary)
         for offset in offsets:
-            summary += _bytes_of(offset)
+            summary += record_bytes(offset)
         crc = zlib.crc32(_FOOTER(int(Opcode.FOOTER), 20, summary_start, offset_start),
                          zlib.crc32(summary))  # fmt: skip
-        footer = _bytes_of(Footer(summary_start, offset_start, crc))
+        footer = record_bytes(Footer(summary_start, offset_start, crc))
         self._file.append(data_end + summary + footer + MCAP0_MAGIC)
         self.finished = True
 
     def close(self) -> None:
-        """Close the file; again does nothing."""
+        """Close the file; a second call does nothing."""
         self._file.close()
 
     def _define(self, definition: Definition) -> None:
-        """Write a channel and its schema into the open chunk, if they are not near already."""
+        """Write a channel and its schema into the open chunk, if no recent chunk has them."""
         channel_id = definition.channel.id
-        if channel_id in self._near:
+        if channel_id in self._recent:
             return
-        self._near.add(channel_id)
+        self._recent.add(channel_id)
         if channel_id not in self._defined:
             self._new.append(channel_id)
         known = self._defined.setdefault(channel_id, definition)  # may not change in a file
@@ -280,7 +273,7 @@ class McapFile:
         start = min(min(index[::2]) for index in indexes.values())
         end = max(max(index[::2]) for index in indexes.values())
         data = self._compress(plain)
-        record = _bytes_of(
+        record = record_bytes(
             Chunk(
                 compression=self._compression,
                 data=data,
@@ -314,11 +307,12 @@ class McapFile:
         )
         self.start = min(self.start, start) if self.counts else start
         self.end = max(self.end, end)
+        self.duration += end - start
         for channel_id, index in indexes.items():
             self.counts[channel_id] = self.counts.get(channel_id, 0) + len(index) // 2
 
     def _summary(self) -> list[tuple[int, list[McapRecord]]]:
-        schemas = {d.schema.id: d.schema for d in self._defined.values()}
+        schemas = {d.schema.id: d.schema for d in self._defined.values() if d.schema}
         statistics = Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._defined),
@@ -343,7 +337,7 @@ class McapFile:
 def new_attachment(
     name: str, media_type: str, data: bytes, log_time: int | None, create_time: int | None
 ) -> Attachment:
-    """Return an attachment; without times it is of now."""
+    """Return an attachment; a time [ns] that is None is now."""
     now = time.time_ns()
     return Attachment(
         create_time=now if create_time is None else create_time,
@@ -362,9 +356,3 @@ def _compressor(compression: str) -> Callable[[bytes | bytearray], bytes]:
     if compression == 'none':
         return bytes
     raise BagError(f'compression {compression!r} is unknown; known are {", ".join(COMPRESSIONS)}')
-
-
-def _bytes_of(record: McapRecord) -> bytes:
-    builder = RecordBuilder()
-    record.write(builder)
-    return bytes(builder.end())  # type: ignore[no-untyped-call]

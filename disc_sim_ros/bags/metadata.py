@@ -1,20 +1,22 @@
-"""metadata.yaml: what rosbag2 says of a whole bag, version 9 as Jazzy writes it."""
+"""metadata.yaml and the record of the same content in each MCAP file: version 9, as in Jazzy."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import re
 from typing import Any
 
 import yaml
 
-from disc_sim_ros.bags.topic import Topic, qos_profiles, qos_yaml
+from disc_sim_ros.bags.topic import LOADER, Topic, qos_profiles, qos_yaml
 from disc_sim_ros.errors import BagError
 
 FILE_NAME = 'metadata.yaml'
-RECORD = 'rosbag2'  # the MCAP metadata record that holds the same text
+RECORD = 'rosbag2'  # name of the MCAP metadata record
 KEY = 'serialized_metadata'
+DISTRO_KEY = 'ROS_DISTRO'  # beside it, in files before version 9
 VERSION = 9
 NO_TIME = 9223372036854775807  # ns, rosbag2's starting time of a bag without messages
+_ROOT = 'rosbag2_bagfile_information'  # of metadata.yaml; the MCAP record has none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,66 +49,80 @@ class TopicInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagMetadata:
-    """What metadata.yaml holds."""
+    """What metadata.yaml holds.
+
+    Attributes:
+        topics: Topics with the counts of their messages.
+        files: The files of the bag, in their order.
+        custom_data: Free texts.
+        ros_distro: Of the recorder; '' where it is not known.
+        storage: Format of the files; `mcap` is written.
+        compression_format: Such as 'zstd', where the compression mode is not none.
+        compression_mode: 'MESSAGE' if each message is compressed, 'FILE' if each file is.
+        message_count: As read; what is written is the sum over the files.
+    """
 
     topics: tuple[TopicInfo, ...] = ()
     files: tuple[FileInfo, ...] = ()
     custom_data: Mapping[str, str] = field(default_factory=dict)
-    ros_distro: str = 'jazzy'
+    ros_distro: str = ''
     storage: str = 'mcap'
+    compression_format: str = ''
     compression_mode: str = ''
-    message_count: int = 0  # when read; written are the sums
+    message_count: int = 0
 
 
 def text_of(metadata: BagMetadata) -> str:
-    """Return metadata as the YAML of rosbag2, every field in its order."""
-    filled = [f for f in metadata.files if f.message_count]
-    start = min((f.start for f in filled), default=NO_TIME)
-    end = max((f.end for f in filled), default=NO_TIME)
-    lines = [
-        'rosbag2_bagfile_information:',
-        f'  version: {VERSION}',
-        '  storage_identifier: mcap',
-        '  duration:',
-        f'    nanoseconds: {end - start}',
-        '  starting_time:',
-        f'    nanoseconds_since_epoch: {start}',
-        f'  message_count: {sum(f.message_count for f in metadata.files)}',
-        *_block('topics_with_message_count', [_topic(t) for t in metadata.topics]),
-        '  compression_format: ""',
-        '  compression_mode: ""',
-        *_block('relative_file_paths', [[scalar(f.path)] for f in metadata.files]),
-        *_block('files', [_file(f) for f in metadata.files]),
-    ]
-    if metadata.custom_data:
-        lines.append('  custom_data:')
-        lines += [f'    {scalar(k)}: {scalar(v)}' for k, v in metadata.custom_data.items()]
-    else:
-        lines.append('  custom_data: ~')
-    lines.append(f'  ros_distro: {scalar(metadata.ros_distro)}')
+    """Return metadata.yaml, every field in the order of rosbag2."""
+    lines = [f'{_ROOT}:', *(f'  {line}' for line in _fields(metadata))]
     return '\n'.join(lines) + '\n'
 
 
+def record_of(metadata: BagMetadata) -> dict[str, str]:
+    """Return the content of the MCAP metadata record `rosbag2`: the same fields without a root.
+
+    rosbag2 looks for `version` at the top level and plays nothing where it is not there.
+    """
+    return {KEY: '\n'.join(_fields(metadata)) + '\n'}
+
+
 def parse(text: str) -> BagMetadata:
-    """Read metadata.yaml of this or an older version.
+    """Read metadata.yaml or the text of an MCAP record, of this or of an older version.
 
     Raises:
         BagError: It is no such YAML.
     """
     try:
-        root = yaml.load(text, Loader=_LOADER)['rosbag2_bagfile_information']  # noqa: S506 - a SafeLoader
+        content = yaml.load(text, Loader=LOADER)  # noqa: S506 - a SafeLoader
+        root = content.get(_ROOT, content)
         return BagMetadata(
             topics=tuple(_parsed_topic(t) for t in root['topics_with_message_count'] or ()),
             files=tuple(_parsed_files(root)),
             custom_data={str(k): str(v) for k, v in (root.get('custom_data') or {}).items()},
             ros_distro=str(root.get('ros_distro') or ''),
-            storage=str(root['storage_identifier']),
-            compression_mode=str(root.get('compression_mode') or '').lower(),
+            storage=str(root.get('storage_identifier') or ''),
+            compression_format=str(root.get('compression_format') or ''),
+            compression_mode=str(root.get('compression_mode') or ''),
             message_count=int(root['message_count']),
         )
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         reason = ' '.join(str(error).split())
         raise BagError(f'no metadata of rosbag2 ({type(error).__name__}: {reason})') from None
+
+
+def parse_record(content: Mapping[str, str]) -> BagMetadata:
+    """Read the MCAP metadata record `rosbag2`.
+
+    Raises:
+        BagError: It holds no such YAML.
+    """
+    parsed = parse(content.get(KEY, ''))
+    return replace(parsed, ros_distro=parsed.ros_distro or content.get(DISTRO_KEY, ''))
+
+
+def has_root(content: Mapping[str, str]) -> bool:
+    """Return True if an MCAP record has the root of metadata.yaml, so that rosbag2 refuses it."""
+    return content.get(KEY, '').lstrip().startswith(_ROOT)
 
 
 def scalar(text: str) -> str:
@@ -116,7 +132,6 @@ def scalar(text: str) -> str:
     return '"' + ''.join(_ESCAPES.get(c) or _escaped(c) for c in text) + '"'
 
 
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _PLAIN = re.compile(r'[A-Za-z/_][A-Za-z0-9/_]*(\.mcap)?', re.ASCII)
 _WORDS = frozenset(('null', 'true', 'false', 'yes', 'no', 'on', 'off', 'y', 'n'))
 _ESCAPES = {'"': '\\"', '\\': '\\\\', '\n': '\\n', '\t': '\\t', '\r': '\\r', '\0': '\\0'}
@@ -131,14 +146,42 @@ def _escaped(c: str) -> str:
     return f'\\x{n:02x}' if n < 0x100 else f'\\u{n:04x}' if n < 0x10000 else f'\\U{n:08x}'
 
 
+def _fields(metadata: BagMetadata) -> list[str]:
+    """Return the lines of all fields, without the root."""
+    filled = [f for f in metadata.files if f.message_count]
+    start = min((f.start for f in filled), default=NO_TIME)
+    end = max((f.end for f in filled), default=NO_TIME)
+    lines = [
+        f'version: {VERSION}',
+        'storage_identifier: mcap',
+        'duration:',
+        f'  nanoseconds: {end - start}',
+        'starting_time:',
+        f'  nanoseconds_since_epoch: {start}',
+        f'message_count: {sum(f.message_count for f in metadata.files)}',
+        *_block('topics_with_message_count', [_topic(t) for t in metadata.topics]),
+        f'compression_format: {scalar(metadata.compression_format)}',
+        f'compression_mode: {scalar(metadata.compression_mode)}',
+        *_block('relative_file_paths', [[scalar(f.path)] for f in metadata.files]),
+        *_block('files', [_file(f) for f in metadata.files]),
+    ]
+    if metadata.custom_data:
+        lines.append('custom_data:')
+        lines += [f'  {scalar(k)}: {scalar(v)}' for k, v in metadata.custom_data.items()]
+    else:
+        lines.append('custom_data: ~')
+    lines.append(f'ros_distro: {scalar(metadata.ros_distro)}')
+    return lines
+
+
 def _block(key: str, items: list[list[str]]) -> list[str]:
     """Return a sequence of items, each some lines."""
     if not items:
-        return [f'  {key}: []']
-    lines = [f'  {key}:']
+        return [f'{key}: []']
+    lines = [f'{key}:']
     for first, *rest in items:
-        lines.append(f'    - {first}')
-        lines += [f'      {line}' for line in rest]
+        lines.append(f'  - {first}')
+        lines += [f'    {line}' for line in rest]
     return lines
 
 
@@ -192,19 +235,25 @@ def _parsed_topic(item: Any) -> TopicInfo:
 
 
 def _parsed_files(root: Any) -> list[FileInfo]:
-    told = {f['path']: f for f in root.get('files') or ()}
+    infos = {_plain_path(f['path']): f for f in root.get('files') or ()}
     files = []
     for path in root['relative_file_paths'] or ():
-        if path not in told:
+        info = infos.get(_plain_path(path))
+        if info is None:
             files.append(FileInfo(path=str(path)))
             continue
-        start = int(told[path]['starting_time']['nanoseconds_since_epoch'])
+        start = int(info['starting_time']['nanoseconds_since_epoch'])
         files.append(
             FileInfo(
                 path=str(path),
-                message_count=int(told[path]['message_count']),
+                message_count=int(info['message_count']),
                 start=start,
-                end=start + int(told[path]['duration']['nanoseconds']),
+                end=start + int(info['duration']['nanoseconds']),
             )
         )
     return files
+
+
+def _plain_path(path: object) -> str:
+    """Return the path without the ending of a compressed file, which rosbag2 gives only once."""
+    return str(path).removesuffix('.zstd')

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from disc_sim_ros.bags import metadata
-from disc_sim_ros.bags.mcap_writer import Definition, McapFile
+from disc_sim_ros.bags.definitions import Definition, channel_of, schema_of
+from disc_sim_ros.bags.mcap_writer import McapFile
 from disc_sim_ros.bags.metadata import BagMetadata, FileInfo, TopicInfo
 from disc_sim_ros.bags.topic import Topic
 
@@ -18,16 +18,18 @@ class MetadataBuilder:
         self.custom_data = dict(custom_data)
         self.closed_files: list[FileInfo] = []
         self.closed_size = 0  # bytes of these files
-        self.text_size = 0  # bytes of the last metadata
         self._closed_counts: dict[int, int] = {}  # messages in the closed files, by topic
-        self._schemas: dict[tuple[str, str], int] = {}  # type, definition: schema id
+        self._repeats: dict[int, int] = {}  # messages written a second time, by topic
+        self._schema_ids: dict[tuple[str, str, bytes], int] = {}  # by name, encoding, data
         self._ros_distro = ros_distro
 
     def set_topic(self, topic_id: int, topic: Topic) -> Definition:
         """Add a topic or replace its description; return its MCAP records."""
-        schema = self._schemas.setdefault((topic.type, topic.definition), len(self._schemas) + 1)
+        schema = schema_of(topic, 0)
+        key = schema.name, schema.encoding, schema.data
+        schema.id = self._schema_ids.setdefault(key, len(self._schema_ids) + 1)
         self.topics[topic_id] = topic
-        definition = Definition.of(topic, topic_id, schema)
+        definition = Definition.of(channel_of(topic, topic_id, schema.id), schema)
         self.definitions[topic_id] = definition
         self.definitions_size = sum(len(d.packed) for d in self.definitions.values())
         return definition
@@ -39,39 +41,41 @@ class MetadataBuilder:
         for topic_id, count in file.counts.items():
             self._closed_counts[topic_id] = self._closed_counts.get(topic_id, 0) + count
 
+    def count_repeat(self, topic_id: int) -> None:
+        """Note that a message was written again, at the beginning of a file."""
+        self._repeats[topic_id] = self._repeats.get(topic_id, 0) + 1
+
     def files(self, open_file: McapFile) -> list[FileInfo]:
         """Return all files, the open one last."""
         return [*self.closed_files, file_info(open_file)]
 
     def counts(self, open_file: McapFile) -> dict[str, int]:
-        """Return the messages of each topic, by name, with those of the open chunk."""
+        """Return the messages taken of each topic, by name, with those of the open chunk."""
         counts = dict.fromkeys((t.name for t in self.topics.values()), 0)
         for topic_id, topic in self.topics.items():
-            counts[topic.name] += self._count(topic_id, open_file) + open_file.pending_of(topic_id)
+            written = self._count(topic_id, open_file) + open_file.pending_of(topic_id)
+            counts[topic.name] += written - self._repeats.get(topic_id, 0)
         return counts
 
     def message_count(self, open_file: McapFile) -> int:
-        """Return the messages written, without those of the open chunk."""
-        return sum(self._closed_counts.values()) + open_file.message_count
+        """Return the messages taken and written, without those of the open chunk."""
+        written = sum(self._closed_counts.values()) + open_file.message_count
+        return written - sum(self._repeats.values())
 
-    def text(self, open_file: McapFile) -> str:
-        """Return metadata.yaml, with what is written of the open file."""
+    def metadata(self, open_file: McapFile) -> BagMetadata:
+        """Return the content of metadata.yaml, with what is written of the open file."""
         topics: dict[str, TopicInfo] = {}
         for topic_id, topic in self.topics.items():
             before = topics.get(topic.name)  # of another type or definition
             count = self._count(topic_id, open_file) + (before.message_count if before else 0)
             first = before.topic if before else topic
             topics[topic.name] = TopicInfo(topic=first, message_count=count)
-        text = metadata.text_of(
-            BagMetadata(
-                topics=tuple(topics.values()),
-                files=tuple(self.files(open_file)),
-                custom_data=self.custom_data,
-                ros_distro=self._ros_distro,
-            )
+        return BagMetadata(
+            topics=tuple(topics.values()),
+            files=tuple(self.files(open_file)),
+            custom_data=self.custom_data,
+            ros_distro=self._ros_distro,
         )
-        self.text_size = len(text.encode())
-        return text
 
     def _count(self, topic_id: int, open_file: McapFile) -> int:
         return self._closed_counts.get(topic_id, 0) + open_file.counts.get(topic_id, 0)

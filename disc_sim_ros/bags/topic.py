@@ -58,16 +58,31 @@ class Qos:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Topic:
-    """A topic with all that is needed to read and to play back its messages."""
+    """A topic with all that is needed to read and to play back its messages.
 
-    name: str  # '/odom'
-    type: str  # 'nav_msgs/msg/Odometry'
-    definition: str = ''  # of the type and all it holds; '' when it was not found
-    type_hash: str = ''  # 'RIHS01_...'
-    qos: tuple[Qos, ...] = ()  # offered, one profile a publisher
+    Attributes:
+        name: Such as '/odom'.
+        type: Such as 'nav_msgs/msg/Odometry'; '' where the bag names none.
+        definition: Text of the type and of all types that it holds; '' of a type without fields,
+            None where there is none.
+        type_hash: 'RIHS01_...', or ''.
+        qos: Offered, one profile for each publisher.
+        serialization_format: Encoding of the messages.
+        definition_encoding: Of `definition`; 'ros2idl' and others in bags of other recorders.
+    """
+
+    name: str
+    type: str
+    definition: str | None = None
+    type_hash: str = ''
+    qos: tuple[Qos, ...] = ()
     serialization_format: str = 'cdr'
-    definition_encoding: str = 'ros2msg'  # or 'ros2idl', in bags of others
-    extra: tuple[tuple[str, str], ...] = ()  # further channel metadata, in bags of others
+    definition_encoding: str = 'ros2msg'
+
+    @property
+    def latched(self) -> bool:
+        """True if a publisher sends its last messages to subscriptions that come later."""
+        return any(profile.durability == 'transient_local' for profile in self.qos)
 
 
 def qos_yaml(profiles: Iterable[Qos]) -> str:

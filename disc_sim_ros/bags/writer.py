@@ -1,26 +1,31 @@
 """Writing a bag: a folder that rosbag2, Foxglove and this package read, safe at any moment."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import math
 from pathlib import Path
 import shutil
 import struct
 import time
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from disc_sim_ros import files, validation
-from disc_sim_ros.bags import metadata
+from disc_sim_ros.bags import latched, metadata
+from disc_sim_ros.bags.latched import Kept, LatchedMessages
 from disc_sim_ros.bags.mcap_writer import (
     CHUNK_SIZE,
     COMPRESSIONS,
-    Definition,
     McapFile,
     new_attachment,
 )
 from disc_sim_ros.bags.metadata_builder import MetadataBuilder
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.errors import BagError, WriteError
+
+if TYPE_CHECKING:
+    from collections import deque
+
+    from disc_sim_ros.bags.definitions import Definition
 
 _MOST_CHANNELS = 65535  # ids are of 16 bits
 _MARGIN = 64 * 1024  # bytes of room kept for the end beside what is counted
@@ -43,19 +48,22 @@ class BagWriter:
         max_size: int | None = None,
         max_duration: float | None = None,
         custom_data: Mapping[str, str] = {},
-        ros_distro: str = 'jazzy',
+        ros_distro: str = '',
+        repeat_latched: bool = False,
     ) -> None:
         """Make the folder, its first file and metadata.yaml.
 
         Args:
             folder: To be made, with its parents; it must not exist.
             compression: Of the chunks: 'zstd', 'lz4' or 'none'.
-            flush_period: Longest time that a message waits for the disk [s, wall time], as long
-                as messages come; `flush` is for when they do not.
+            flush_period: Longest time that a message waits for the disk [s, wall time], while
+                messages come; call `flush` when none come.
             max_size: A file that has reached this size is followed by another [bytes].
             max_duration: As `max_size`, by log time [s].
             custom_data: Free texts for metadata.yaml.
-            ros_distro: Of the messages.
+            ros_distro: Of the messages; '' where it is not known.
+            repeat_latched: Let each further file begin with the last messages of the topics whose
+                publishers are transient local, so that it can be played and viewed alone.
 
         Raises:
             ConfigError: A value is not allowed, the folder exists or cannot be made.
@@ -78,9 +86,12 @@ class BagWriter:
             ros_distro, {str(k): str(v) for k, v in custom_data.items()}
         )
         self._writable: dict[int, Definition] = {}  # by topic id; empty once writing is over
+        self._latched = LatchedMessages() if repeat_latched else None
+        self._kept: dict[int, deque[Kept]] = self._latched.by_topic if self._latched else {}
         self._failure: BagError | None = None
         self._closed = False
-        self._stale = True  # metadata.yaml does not say all
+        self._stale = True  # metadata.yaml is behind the files
+        self._text_size = 0  # bytes of the last metadata.yaml
         self._synced = 0  # bytes of the open file that the disk has
         self._chunk_size = min(CHUNK_SIZE, max(4096, self._max_size / 8))
         self._reserve = files.Reserve(self.folder)
@@ -108,7 +119,7 @@ class BagWriter:
         return topic_id
 
     def update(self, topic_id: int, topic: Topic) -> None:
-        """Say something else of a topic: metadata.yaml tells it, and the files still to come."""
+        """Replace the description of a topic in metadata.yaml and in the files to come."""
         self._refuse_when_over()
         before = self._metadata.topics.get(topic_id)
         if before is None or (before.name, before.type) != (topic.name, topic.type):
@@ -135,6 +146,8 @@ class BagWriter:
             if log_time >= self._turn_at:
                 self._turn(log_time)
             pending = self._file.write(definition, data, log_time, publish_time, sequence)
+            if topic_id in self._kept:
+                self._kept[topic_id].append(Kept(data, publish_time, sequence))
         except (KeyError, struct.error):
             self._refuse_when_over()
             if topic_id not in self._metadata.topics:
@@ -161,7 +174,7 @@ class BagWriter:
             raise self._failed(error) from None
 
     def split(self) -> None:
-        """End the file and begin another; does nothing while the file has no messages.
+        """End the file and begin another; do nothing while the file has no messages.
 
         Raises:
             BagError: The system refuses; what was flushed before is safe.
@@ -219,7 +232,7 @@ class BagWriter:
             raise self._failed(error) from None
 
     def close(self) -> None:
-        """End the bag with its index; again does nothing.
+        """End the bag with its index; a second call does nothing.
 
         Raises:
             BagError: Messages were lost now, or there is no room for the end. Everything flushed
@@ -299,6 +312,8 @@ class BagWriter:
 
     def _set(self, topic_id: int, topic: Topic) -> None:
         self._writable[topic_id] = self._metadata.set_topic(topic_id, topic)
+        if self._latched:
+            self._latched.set_topic(topic_id, topic)
         self._stale = True
 
     def _refuse_when_over(self) -> None:
@@ -308,10 +323,29 @@ class BagWriter:
             raise BagError(f'{self.folder}: the bag is closed')
 
     def _turn(self, log_time: int) -> None:
-        """Begin another file where this one is full; note when it will be."""
+        """Begin another file if this one is full; set when the file will be full."""
         if self._file.message_count + self._file.pending_messages:
             self.split()
         self._turn_at = log_time + self._max_duration
+        if self._latched and self._metadata.closed_files and log_time < 2**64:
+            self._repeat(self._latched.to_repeat(self._max_size), log_time)
+
+    def _repeat(self, messages: Sequence[tuple[int, Kept]], log_time: int) -> None:
+        """Begin the file with messages of before, in a chunk of their own."""
+        if not messages:
+            return
+        try:
+            self._hold_reserve()
+            self._file.add_metadata(latched.RECORD, latched.record(log_time, len(messages)))
+            for topic_id, kept in messages:
+                definition = self._writable[topic_id]
+                self._file.write(definition, kept.data, log_time, kept.publish_time, kept.sequence)
+            self._file.end_chunk()
+        except OSError as error:
+            self._file.drop_chunk()  # they are in an earlier file: nothing is lost
+            raise self._failed(error) from None
+        for topic_id, _ in messages:
+            self._metadata.count_repeat(topic_id)
 
     def _end_chunk(self) -> None:
         try:
@@ -319,10 +353,14 @@ class BagWriter:
             self._file.end_chunk()
         except OSError as error:
             raise self._failed(error) from None
-        if self._file.size >= self._max_size:
-            self._turn_at = 0.0
+        self._check_full()
         if time.monotonic() >= self._due:
             self.flush()
+
+    def _check_full(self) -> None:
+        # The chunks together last longer than the file where sim time was set back.
+        if self._file.size >= self._max_size or self._file.duration >= self._max_duration:
+            self._turn_at = 0.0
 
     def _flush(self) -> None:
         self._due = time.monotonic() + self._period
@@ -333,15 +371,14 @@ class BagWriter:
             self._synced = self._file.size
             self.flushed = self._metadata.message_count(self._file)
             self._stale = True
-        if self._file.size >= self._max_size:
-            self._turn_at = 0.0
+        self._check_full()
         if self._stale:
             self._write_metadata()
             self._stale = False
 
     def _hold_reserve(self) -> None:
         closing = self._file.closing_size(self._metadata.definitions_size)
-        needed = _MARGIN + closing + 3 * self._metadata.text_size
+        needed = _MARGIN + closing + 3 * self._text_size
         if needed > self._reserve.size:
             try:
                 self._reserve.hold(2 * needed)
@@ -373,15 +410,16 @@ class BagWriter:
         self._file = file
         self._turn_at = 0.0
         self._synced = 0
-        file.add_metadata(metadata.RECORD, {metadata.KEY: self._metadata.text(self._file)})
+        file.add_metadata(metadata.RECORD, self._record())
         files.sync_folder(self.folder)
         self._stale = True
 
     def _finish_file(self) -> None:
         if self._file.finished:
             return
-        self._file.add_metadata(metadata.RECORD, {metadata.KEY: self._metadata.text(self._file)})
-        self._file.finish(list(self._metadata.definitions.values()))
+        self._file.define(self._metadata.definitions.values())  # of topics without messages
+        self._file.add_metadata(metadata.RECORD, self._record())
+        self._file.finish()
         self._file.sync()
 
     def _end_in_reserve(self) -> None:
@@ -389,6 +427,10 @@ class BagWriter:
         self._finish_file()
         self._write_metadata()
 
+    def _record(self) -> dict[str, str]:
+        return metadata.record_of(self._metadata.metadata(self._file))
+
     def _write_metadata(self) -> None:
-        text = self._metadata.text(self._file)
-        files.write_whole(self.folder / metadata.FILE_NAME, text.encode())
+        text = metadata.text_of(self._metadata.metadata(self._file)).encode()
+        self._text_size = len(text)
+        files.write_whole(self.folder / metadata.FILE_NAME, text)

@@ -40,9 +40,9 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'repair_bag') -> in
 
 
 def _run(chosen: argparse.Namespace) -> int:
-    from disc_sim_ros.bags.repair import RepairReport, repair  # noqa: PLC0415 - not for --help
+    from disc_sim_ros.bags.repair import repair  # noqa: PLC0415 - not for --help
 
-    report: RepairReport = repair(
+    report = repair(
         Path(chosen.source), Path(chosen.target), lambda text: output.note(chosen.prog, text)
     )
     if chosen.json:

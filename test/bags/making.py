@@ -50,7 +50,7 @@ def topic(name: str, type_name: str, *profiles: Qos) -> Topic:
     return Topic(
         name=name,
         type=type_name,
-        definition=schemas.definition(type_name) or '',
+        definition=schemas.definition(type_name),
         type_hash=schemas.type_hash(type_name) or '',
         qos=profiles,
     )

@@ -69,7 +69,8 @@ QOS_FIELDS = [
 def folder(tmp_path_factory) -> Path:
     """A bag of two files."""
     path = tmp_path_factory.mktemp('bags') / 'throw 1'
-    write_bag(path, COUNT, split_at=(1700,), custom_data={'drops': '0', 'note': 'a: "b"\n\tü'})
+    custom = {'drops': '0', 'note': 'a: "b"\n\tü'}
+    write_bag(path, COUNT, split_at=(1700,), custom_data=custom, ros_distro='jazzy')
     return path
 
 
@@ -152,6 +153,7 @@ def test_a_bag_without_messages_has_the_times_of_rosbag2(tmp_path):
     assert told['starting_time'] == {'nanoseconds_since_epoch': 2**63 - 1}
     assert told['duration'] == {'nanoseconds': 0}
     assert told['custom_data'] is None
+    assert told['ros_distro'] == ''  # not known
     found = open_bag(tmp_path / 'bag')
     assert (found.complete, found.message_count, found.start, found.end) == (True, 0, 0, 0)
 
@@ -178,7 +180,8 @@ def test_records_stand_in_the_order_of_rosbag2(folder):
     assert chunks >= 2
     assert kinds[:2] == ['Header', 'Metadata']
     data = kinds[2 : kinds.index('DataEnd')]
-    assert data == ['Chunk', 'MessageIndex', 'MessageIndex'] * chunks + ['Metadata']
+    # Behind the chunks the channel without messages; its schema is in the first chunk.
+    assert data == ['Chunk', 'MessageIndex', 'MessageIndex'] * chunks + ['Channel', 'Metadata']
     assert kinds[kinds.index('DataEnd') :] == [
         'DataEnd',
         *['Schema'] * 2,
@@ -199,7 +202,7 @@ def test_header_metadata_channels_and_schemas_say_what_rosbag2_says(folder):
         assert record.name == 'rosbag2'
         assert list(record.metadata) == ['serialized_metadata']
         told = yaml.safe_load(record.metadata['serialized_metadata'])
-        assert list(told['rosbag2_bagfile_information']) == FIELDS
+        assert list(told) == FIELDS  # without the root, or rosbag2 plays nothing
     channel = next(r for r in found if isinstance(r, records.Channel) and r.topic == '/odom')
     assert channel.message_encoding == 'cdr'
     assert channel.metadata == {
@@ -241,8 +244,8 @@ def test_a_type_that_is_not_installed_has_a_schema_without_text(tmp_path):
         bag.write(empty, b'\0\1\0\0\0', 2, 2)
     found = raw_records(tmp_path / 'bag/bag_0.mcap')
     told = {r.name: (r.encoding, r.data) for r in found if isinstance(r, records.Schema)}
-    # A message without fields has an empty text that is its definition.
-    assert told == {'odd_msgs/msg/Odd': ('unknown', b''), 'std_msgs/msg/Empty': ('ros2msg', b'')}
+    # No encoding: no definition is there. An empty text defines a message without fields.
+    assert told == {'odd_msgs/msg/Odd': ('', b''), 'std_msgs/msg/Empty': ('ros2msg', b'')}
     assert [m.type for m in open_bag(tmp_path / 'bag').messages(['/empty'])] == [
         'std_msgs/msg/Empty'
     ]

@@ -177,16 +177,38 @@ def edited(tmp_path, **changes) -> None:
     ('changes', 'says'),
     [
         ({'storage_identifier': 'sqlite3'}, 'sqlite3.*ros2 bag convert'),
-        ({'compression_mode': 'FILE'}, 'compression mode file.*ros2 bag convert'),
-        ({'compression_mode': 'message'}, 'compression mode message.*ros2 bag convert'),
-        ({'relative_file_paths': ['no_0.mcap']}, 'no_0.mcap: the file is missing'),
+        ({'relative_file_paths': ['no_0.mcap']}, 'every file .* is missing .no_0.mcap'),
     ],
 )
-def test_bags_of_another_kind_are_named(tmp_path, changes, says):
+def test_a_folder_whose_files_are_of_another_kind_or_gone_is_named(tmp_path, changes, says):
     edited(tmp_path, **changes)
+    (tmp_path / 'bag/bag_0.mcap').unlink()
     with pytest.raises(BagError, match=says) as caught:
         open_bag(tmp_path / 'bag')
     assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'storage_identifier': ''},
+        {'storage_identifier': None},
+        {'storage_identifier': 'sqlite3'},
+        {'compression_mode': 'FILE', 'compression_format': 'zstd'},
+        {'compression_mode': 'message', 'compression_format': 'zstd'},
+        {'relative_file_paths': None, 'files': None},
+    ],
+)
+def test_the_disk_comes_before_what_metadata_says(tmp_path, changes):
+    edited(tmp_path, **changes)
+    found = open_bag(tmp_path / 'bag')
+    assert len(everything(found)) == found.message_count == 11
+    repair(tmp_path / 'bag', tmp_path / 'made')
+    made = open_bag(tmp_path / 'made')
+    assert everything(made) == everything(found)
+    assert made.complete
+    assert made.metadata.compression_mode == ''  # its messages and files are not compressed
+    assert made.metadata.storage == 'mcap'
 
 
 @pytest.mark.parametrize(
@@ -196,7 +218,8 @@ def test_bags_of_another_kind_are_named(tmp_path, changes, says):
         ('a.mcap', b'\x00' * 100_000, 'no MCAP file'),
         ('a.mcap', b'hello', 'no MCAP file'),
         ('a.db3', b'SQLite format 3\0' * 9, 'sqlite3 bag.*ros2 bag convert'),
-        ('a.mcap.zstd', b'\x28\xb5\x2f\xfd' * 9, 'compressed.*zstd -d'),
+        ('a.mcap.zstd', b'\x28\xb5\x2f\xfd' * 9, 'the compressed file is damaged'),
+        ('a.mcap.lz4', b'\x04\x22\x4d\x18' * 9, 'the compressed file is damaged'),
         ('a.bag', b'#ROSBAG V2.0\n', 'ROS 1'),
     ],
 )
@@ -212,7 +235,7 @@ def test_what_is_no_bag_is_named(tmp_path, name, content, says):
     [
         ([], 'no .mcap file'),
         (['a_0.db3'], 'sqlite3'),
-        (['a_0.mcap.zstd'], 'compressed'),
+        (['a_0.mcap.zstd'], 'is empty'),
     ],
 )
 def test_a_folder_that_is_no_bag_is_named(tmp_path, names, says):

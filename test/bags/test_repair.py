@@ -185,6 +185,9 @@ def test_the_program_speaks_json(killed, tmp_path):
         'attachments': 1,
         'bytes_lost': 0,
         'losses': [],
+        'mended': [
+            'killed_1.mcap: it was damaged or had no end',
+        ],
     }
 
 

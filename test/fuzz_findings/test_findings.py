@@ -191,9 +191,7 @@ def test_a_message_that_lacks_its_fields_is_told(tmp_path, topic, kind, definiti
     """By a damaged definition: the name of the type still fits."""
     with BagWriter(tmp_path / 'bag') as writer:
         motion = 'nav_msgs/msg/Odometry'
-        odom = writer.add(
-            Topic(name='/odom', type=motion, definition=schemas.definition(motion) or '')
-        )
+        odom = writer.add(Topic(name='/odom', type=motion, definition=schemas.definition(motion)))
         other = writer.add(Topic(name=topic, type=kind, definition=definition))
         writer.write(odom, odometry(START).data, START, START)
         writer.write(other, b'\x00\x01\x00\x00' + bytes(16), START, START)

@@ -116,7 +116,7 @@ class TopicDiscovery:
             self._refuse(name, f'ROS refuses to subscribe to it as {type_name}')
             return False
         description = bag_topic(name, type_name, publishers)
-        if not description.definition:
+        if description.definition is None:
             self.warn_once(f'{name}: no definition of {type_name} here, so that few can read it')
         self._thread.add_topic(recorder.topic, description)
         recorder.set_described(len(publishers))

@@ -1,7 +1,6 @@
 """`recorder_node`: every topic into a bag, as the bytes that arrived."""
 
 from collections.abc import Callable, Mapping, Sequence
-import os
 import sys
 from typing import Any
 
@@ -12,6 +11,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from disc_sim_ros import topics
+from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import BagError
 from disc_sim_ros.ros import node_main, parameters
@@ -58,7 +58,8 @@ class RecorderNode(Node):
             max_size=config.max_size,
             max_duration=config.max_duration,
             custom_data={'recorder': self.get_fully_qualified_name()},
-            ros_distro=os.environ.get('ROS_DISTRO', 'jazzy'),
+            ros_distro=schemas.ros_distro(),
+            repeat_latched=config.repeat_latched,
         )
         self._writer_thread = WriterThread(self.writer, config.flush_period)
         sim_time: bool = self.get_parameter('use_sim_time').value

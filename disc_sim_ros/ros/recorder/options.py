@@ -39,6 +39,12 @@ RECORDER_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
             choices=tuple(COMPRESSIONS),
         ),
         spec_of(RECORDING['flush_period'], 'fixed'),
+        ParameterSpec(
+            'repeat_latched',
+            default=True,
+            effect='fixed',
+            meaning='Begin each further file with the last messages of latched topics.',
+        ),
     ),
     'What is recorded': (
         ParameterSpec(
@@ -126,6 +132,7 @@ class RecorderConfig:
     max_duration: float | None
     compression: str
     flush_period: float
+    repeat_latched: bool
     start_paused: bool
 
 
@@ -151,6 +158,7 @@ def recorder_config(values: Mapping[str, object], namespace: str = '/') -> Recor
         max_duration=v['max_duration_s'] or None,
         compression=v['compression'],
         flush_period=v['flush_period'],
+        repeat_latched=v['repeat_latched'],
         start_paused=v['start_paused'],
     )
 

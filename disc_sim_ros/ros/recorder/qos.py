@@ -41,7 +41,7 @@ def bag_topic(name: str, type_name: str, publishers: Sequence[TopicEndpointInfo]
     return Topic(
         name=name,
         type=type_name,
-        definition=schemas.definition(type_name) or '',
+        definition=schemas.definition(type_name),
         type_hash=hashes[0] if hashes else schemas.type_hash(type_name) or '',
         qos=tuple(bag_qos(p.qos_profile) for p in publishers),
     )

@@ -89,7 +89,7 @@ class BagSinkFactory:
         topic = Topic(
             name=name if name.startswith('/') else f'/{name}',
             type=type_name,
-            definition=schemas.definition(type_name) or '',
+            definition=schemas.definition(type_name),
             type_hash=schemas.type_hash(type_name) or '',
             qos=(discovered_qos(qos),),
         )
@@ -117,8 +117,12 @@ def write_flight(
         DiscSimError: The system refuses to write, or the flight is lost.
     """
     folder = Path(bag)
+    distro = schemas.ros_distro()
     try:
-        with files.whole_folder('bag', folder) as part, BagWriter(part) as writer:
+        with (
+            files.whole_folder('bag', folder) as part,
+            BagWriter(part, ros_distro=distro) as writer,
+        ):
             _fly(BagSinkFactory(writer), config, control, duration, start)
     except OSError as error:
         raise DiscSimError(f'{folder.absolute()}: cannot be made ({error.strerror})') from None

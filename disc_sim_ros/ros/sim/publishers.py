@@ -57,7 +57,8 @@ class Publishers:
         spin = TransformStamped(child_frame_id=body)
         spin.header.frame_id = disc
         self._spin_transform = CdrTemplate(spin, messages.SPIN_TRANSFORM_FIELDS)
-        joint = JointState(name=[topics.SPIN_JOINT], position=[0.0], velocity=[0.0])
+        # No motor turns the joint. Behind an empty list Fast CDR leaves bytes that rosbags refuses
+        joint = JointState(name=[topics.SPIN_JOINT], position=[0.0], velocity=[0.0], effort=[0.0])
         self.joint_states = sink(topics.JOINT_STATES, joint, messages.JOINT_FIELDS)
         self.imu = sink(topics.IMU, _imu_message(body), messages.IMU_FIELDS)
         wrench = WrenchStamped()

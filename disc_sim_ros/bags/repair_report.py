@@ -1,0 +1,92 @@
+"""What a repair kept and lost, as a text and as a document for programs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from disc_sim_ros.bags.contents import Loss
+
+
+@dataclass(frozen=True, slots=True)
+class RepairReport:
+    """What a repair kept and lost.
+
+    Attributes:
+        source: The bag that was read.
+        target: The bag that was made.
+        was_whole: Nothing was damaged or missing in the source.
+        kept: Messages by topic.
+        attachments: How many were kept.
+        losses: What is damaged or missing.
+        mended: What was put right, a line for each file and fault.
+    """
+
+    source: Path
+    target: Path
+    was_whole: bool
+    kept: dict[str, int]
+    attachments: int
+    losses: tuple[Loss, ...]
+    mended: tuple[str, ...] = ()
+
+    @property
+    def message_count(self) -> int:
+        """Messages kept, of all topics."""
+        return sum(self.kept.values())
+
+    @property
+    def bytes_lost(self) -> int:
+        """Bytes of the source that cannot be read."""
+        return sum(loss.length for loss in self.losses)
+
+    def document(self) -> dict[str, Any]:
+        """Return the report for programs."""
+        return {
+            'source': str(self.source),
+            'target': str(self.target),
+            'was_whole': self.was_whole,
+            'message_count': self.message_count,
+            'kept': self.kept,
+            'attachments': self.attachments,
+            'bytes_lost': self.bytes_lost,
+            'losses': [
+                {
+                    'file': str(loss.path),
+                    'offset': loss.offset,
+                    'length': loss.length,
+                    'messages': loss.messages,
+                    'reason': loss.reason,
+                }
+                for loss in self.losses
+            ],
+            'mended': list(self.mended),
+        }
+
+    def summary(self) -> str:
+        """Return the report to read."""
+        width = max(map(len, self.kept), default=0)
+        lines = [f'{self.source} -> {self.target}']
+        lines += [
+            f'  {name:{width}}  {_count(count, "message")}' for name, count in self.kept.items()
+        ]
+        lines.append(
+            f'  kept  {_count(self.message_count, "message")} of '
+            f'{_count(len(self.kept), "topic")}, {_count(self.attachments, "attachment")}'
+        )
+        if self.losses:
+            known = sum(loss.messages or 0 for loss in self.losses)
+            messages = f', {_count(known, "message")} that are known of' if known else ''
+            lines.append(f'  lost  {_count(self.bytes_lost, "byte")}{messages}')
+            lines += [f'    {loss}' for loss in self.losses]
+        elif self.was_whole:
+            lines.append('  the bag was whole')
+        else:
+            lines.append('  lost  nothing')
+            if not self.mended:
+                lines.append('  mended: metadata.yaml was missing or old')
+        lines += [f'  mended: {text}' for text in self.mended]
+        return '\n'.join(lines)
+
+
+def _count(number: int, thing: str) -> str:
+    return f'{number} {thing}{"" if number == 1 else "s"}'
