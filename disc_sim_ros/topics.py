@@ -1,10 +1,13 @@
-"""Names of topics, qualities of service and frames: the only place where they are written.
+"""Names of topics, frames and flight events: the only place where they are written.
 
-Names are relative, so that namespaces and remapping work, except for those that ROS has fixed.
+Names of topics are relative, so that namespaces and remapping work, except for those that ROS has
+fixed.
 """
 
 from dataclasses import dataclass
+from enum import StrEnum
 import re
+from types import MappingProxyType
 from typing import ClassVar
 
 from disc_sim_ros.errors import ConfigError
@@ -43,6 +46,64 @@ WIND = 'wind'
 SPIN_JOINT = 'spin'  # name of the joint in JOINT_STATES, from `disc` to `disc_body`
 
 
+class FlightEvent(StrEnum):
+    """What FLIGHT_EVENTS reports."""
+
+    THROWN = 'thrown'
+    LANDED = 'landed'
+    RESET = 'reset'
+    FAILED = 'failed'  # the integration
+    COMMAND_EXPIRED = 'command expired'
+
+
+def event_title(node: str, event: str) -> str:
+    """Return the name of the message of an event, from the names of the node and of the event."""
+    return f'{node}: {event}'
+
+
+def event_of(title: str) -> str:
+    """Return the name of an event from the name of its message."""
+    return title.rpartition(': ')[2]
+
+
+class NodeTopic:
+    """Topics that rclpy gives every node."""
+
+    ROSOUT = '/rosout'
+    PARAMETER_EVENTS = '/parameter_events'
+
+
+class MessageType:
+    """Types of messages by name, as graphs and bags have them."""
+
+    ODOMETRY = 'nav_msgs/msg/Odometry'
+    POSE = 'geometry_msgs/msg/PoseStamped'
+    STRING = 'std_msgs/msg/String'
+    DIAGNOSTIC_STATUS = 'diagnostic_msgs/msg/DiagnosticStatus'
+    WRENCH = 'geometry_msgs/msg/WrenchStamped'
+    VECTOR = 'geometry_msgs/msg/Vector3Stamped'
+    PARAMETER_EVENT = 'rcl_interfaces/msg/ParameterEvent'
+
+
+# What acts on a flight from a time on; a re-simulation needs all of it.
+APPLIED = (APPLIED_MOMENT, APPLIED_COEFFICIENTS, APPLIED_WIND)
+
+# The topics of sim_node that describe a flight beside its motion, and their types.
+FLIGHT_TOPICS = MappingProxyType(
+    {
+        CONFIGURATION: MessageType.STRING,
+        RELEASE: MessageType.ODOMETRY,
+        FLIGHT_EVENTS: MessageType.DIAGNOSTIC_STATUS,
+        APPLIED_MOMENT: MessageType.WRENCH,
+        APPLIED_COEFFICIENTS: MessageType.VECTOR,
+        APPLIED_WIND: MessageType.VECTOR,
+    }
+)
+
+# Parameters of sim_node that change a flight without a stamp of their own.
+WIND_PROFILE = ('wind.roughness_length', 'wind.reference_height')
+
+
 @dataclass(frozen=True, slots=True)
 class Frames:
     """Names of the frames.
@@ -77,9 +138,18 @@ class Frames:
         """
         if not cls.PREFIX.fullmatch(frame_prefix):
             raise ConfigError('frame_prefix', frame_prefix, f'give {cls.PREFIX_RULE}')
+        return cls._with(frame_prefix)
+
+    @classmethod
+    def of_disc(cls, disc: str) -> 'Frames':
+        """Return the names that go with a recorded name of the frame `disc`, unchecked."""
+        return cls._with(disc.removesuffix(cls().disc))
+
+    @classmethod
+    def _with(cls, prefix: str) -> 'Frames':
         plain = cls()
         return cls(
-            disc=frame_prefix + plain.disc,
-            disc_body=frame_prefix + plain.disc_body,
-            disc_air=frame_prefix + plain.disc_air,
+            disc=prefix + plain.disc,
+            disc_body=prefix + plain.disc_body,
+            disc_air=prefix + plain.disc_air,
         )

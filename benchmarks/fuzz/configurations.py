@@ -6,10 +6,12 @@ import disc_files
 import flown
 import numpy as np
 
+from disc_sim_ros import topics
 from disc_sim_ros.analysis import recording, resimulate
 from disc_sim_ros.analysis.odometry import Motion
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.physics.flight_config import configuration_text
+from disc_sim_ros.physics.flight_config import FlightConfig, configuration_text, document_of
+from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.ros.sim.config import configuration
 
@@ -20,9 +22,11 @@ WORDS = (
 _START = 1_700_000_000_000_000_000  # ns
 _SECOND = 1_000_000_000
 _CHANGES = (
-    recording.Change('applied_moment', _START + 20_000_000, (0.01, 0.0, 0.0), 'disc_body'),
-    recording.Change('applied_coefficients', _START + 30_000_000, (0.0, 0.01, 0.0), 'disc_air'),
-    recording.Change('applied_wind', _START + 40_000_000, (3.0, 1.0, 0.0), 'map'),
+    recording.Change(topics.APPLIED_MOMENT, _START + 20_000_000, (0.01, 0.0, 0.0), 'disc_body'),
+    recording.Change(
+        topics.APPLIED_COEFFICIENTS, _START + 30_000_000, (0.0, 0.01, 0.0), 'disc_air'
+    ),
+    recording.Change(topics.APPLIED_WIND, _START + 40_000_000, (3.0, 1.0, 0.0), 'map'),
 )
 
 
@@ -31,22 +35,22 @@ def seeds() -> list[bytes]:
     found = []
     for disc, model in (('frisbee', 'exact'), ('wraith', 'precession'), ('flat_plate', 'exact')):
         config = configuration({'disc': disc, 'model': model, 'wind.turbulence': 5.0})
-        text = configuration_text(
-            config.setup,
-            Launch().state(),
-            1,
+        flight = FlightConfig(
+            setup=config.setup,
+            release=Launch().state(),
+            flight=1,
             physics_rate=config.physics_rate,
             publish_rate=config.publish_rate,
             ground=config.ground,
             command_timeout=config.command_timeout,
         )
-        found.append(text.encode())
+        found.append(configuration_text(flight).encode())
     return found
 
 
 def one(data: bytes) -> None:
     """Read one configuration as `analyse_bag --verify` reads it, and fly 100 steps with it."""
-    document = recording._document(data.decode(errors='replace'))  # noqa: SLF001 - the reader
+    document = document_of(data.decode(errors='replace'))
     if document is None:
         return
     stamps = _START + np.arange(0, 11) * 10_000_000
@@ -65,7 +69,7 @@ def one(data: bytes) -> None:
     resimulate.compare(flight, again)
     if not again.lost:
         for state in again.states:
-            flown.require_sound(type(again.release)(*state.tolist()))
+            flown.require_sound(State(*state.tolist()))
 
 
 def _is_slow(document: object) -> bool:

@@ -1,177 +1,69 @@
-"""A recorded flight as figures and as a document for programs."""
+"""Reports of a recorded flight: a document for programs, and lines to read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from datetime import UTC, datetime
 import math
-import re
 from typing import Any
 
 import numpy as np
 
-from disc_sim_ros.analysis.checks import (
-    Check,
-    Stamps,
-    checks,
-    ground_crossing,
-    stamps_of,
-    turns_with_spin,
-    with_twist,
-)
-from disc_sim_ros.analysis.recording import NANOSECONDS, Change, Flight
-from disc_sim_ros.analysis.resimulate import Reflight, Verdict, compare, fly_again
-from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros import topics
+from disc_sim_ros.analysis.bag_analysis import Analysis
+from disc_sim_ros.analysis.checks import Stamps, turns_with_spin
+from disc_sim_ros.analysis.flight_report import sideways
+from disc_sim_ros.analysis.recording import Change, Flight
 from disc_sim_ros.physics import frames, theory
-from disc_sim_ros.physics.kernels.equations import State
-from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.physics.flight_config import NANOSECONDS, Key
 
-_LOSSES = re.compile(r'drop|lost|loss|gap|missed', re.IGNORECASE)
-GUSTS, MEAN, STILL = 'with gusts', 'mean wind, without gusts', 'wind unknown, taken as 0'
-
-
-@dataclass(frozen=True, eq=False)
-class Analysis:
-    """What is known of one recorded flight.
-
-    Attributes:
-        flight: What was recorded.
-        again: Its re-flight; None where it cannot be flown again.
-        verdict: How that compares.
-        why_not: Why there is no re-flight, or ''.
-        trajectory: The recorded motion up to the landing.
-        wind: Where the wind in it is from: GUSTS, MEAN or STILL.
-        release: The exact state at release where it was recorded, else that of the first message.
-        landing: flight_time_s, landing_x_m, landing_y_m, and spin_rad_s where it is known; None
-            where no landing was seen.
-        stamps: How its messages follow each other.
-        checks: What was checked without knowing what flew.
-    """
-
-    flight: Flight
-    again: Reflight | None
-    verdict: Verdict | None
-    why_not: str
-    trajectory: Trajectory
-    wind: str
-    release: State
-    landing: Mapping[str, float] | None
-    stamps: Stamps
-    checks: tuple[Check, ...]
+_SETUP = (
+    Key.DISC,
+    Key.MODEL,
+    Key.AERO,
+    Key.MOMENT_AXES,
+    Key.PHYSICS_RATE,
+    Key.PUBLISH_RATE,
+    Key.VERSION,
+    Key.FLIGHT,
+)
 
 
-def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
-    """Analyse a recorded flight.
-
-    Args:
-        flight: What was recorded.
-        bag_doubts: What the bag as a whole may lack.
-    """
-    again, verdict, why_not = None, None, ''
-    try:
-        again = fly_again(flight)
-        verdict = compare(flight, again, bag_doubts)
-    except DiscSimError as error:
-        why_not = str(error)
-    motion = with_twist(flight.motion)
-    states = frames.states_from_odometry(motion.numbers)
-    if again is not None and verdict is not None and verdict.exact:
-        winds, wind = again.winds, GUSTS if again.setup.wind.turbulence else MEAN
-    else:
-        winds, wind = _mean_wind(flight, again)
-    landing = _landing(flight, again, verdict)
-    end = math.inf if landing is None else landing['flight_time_s']
-    flown = flight.time < end
-    flown[0] = True
-    rows = np.column_stack([flight.time, states, winds])[flown]
-    diameter = math.nan if again is None else again.setup.disc.diameter
-    return Analysis(
-        flight=flight,
-        again=again,
-        verdict=verdict,
-        why_not=why_not,
-        trajectory=Trajectory(rows, diameter),
-        wind=wind,
-        release=State(*states[0].tolist()) if again is None else again.release,
-        landing=landing,
-        stamps=stamps_of(flight.motion),
-        checks=tuple(checks(flight.motion)),
-    )
-
-
-def _mean_wind(flight: Flight, again: Reflight | None) -> tuple[FloatArray, str]:
-    """Return the mean wind at each message, earth axes 1 [m/s], and what to call it."""
-    told = [c for c in flight.disc.changes if c.topic == 'applied_wind']
-    stamps = flight.motion.stamps
-    winds = np.zeros((len(stamps), 3))
-    if again is not None:
-        winds[:] = again.setup.wind.mean
-    for change in told:
-        winds[stamps >= change.stamp] = frames.flip_yz(change.values)
-    return winds, MEAN if told or again is not None else STILL
-
-
-def _landing(
-    flight: Flight, again: Reflight | None, verdict: Verdict | None
-) -> Mapping[str, float] | None:
-    """Return how the flight ended: as was told, as it was flown again, or as it was seen."""
-    names = ('flight_time_s', 'landing_x_m', 'landing_y_m', 'spin_rad_s')
-    if flight.landing is not None:
-        try:
-            return {name: float(flight.landing.values[name]) for name in names}
-        except (KeyError, ValueError):
-            pass  # not one of sim_node
-    flown = again.landing if again is not None and verdict is not None and verdict.exact else {}
-    if flown and flown['flight_time_s'] <= flight.time[-1]:
-        return {name: flown[name] for name in names}
-    told = flight.release.configuration if flight.release else None
-    crossing = ground_crossing(flight.motion) if told is None or told.get('ground') else None
-    if crossing is None:
-        return None
-    time, place = crossing
-    found = {
-        'flight_time_s': time + flight.starts_late,
-        'landing_x_m': float(place[0]),
-        'landing_y_m': float(place[1]),
-    }
-    if flight.motion.has_twist:
-        row = int(np.searchsorted(flight.time, found['flight_time_s']))
-        found['spin_rad_s'] = frames.flip(float(flight.motion.numbers[max(row - 1, 0), 12]))
-    return found
+# ---- documents for programs ----
 
 
 def document(a: Analysis) -> dict[str, Any]:
     """Return an analysis as values that JSON knows; keys carry units, positions are in `map`."""
     flight, states = a.flight, a.trajectory
-    told = flight.release.configuration if flight.release else None
+    configuration = flight.configuration
     position = frames.map_from_paper(states.position) + 0.0
     start = frames.map_from_paper(a.release[:3]) + 0.0
-    end = position[-1]
+    end, time, spin = position[-1], float(states.t[-1]), float(states.spin[-1])
+    spin_left = None
     if a.landing is not None:
-        end = np.array([a.landing['landing_x_m'], a.landing['landing_y_m'], 0.0])
+        end, time = np.array([a.landing.x, a.landing.y, 0.0]), a.landing.time
+        if a.landing.spin is not None:
+            spin = a.landing.spin
+            spin_left = spin / a.release.r if a.release.r else None
     away = end - start
     heading = _heading(a)
-    spin_left = None
-    if a.landing is not None and 'spin_rad_s' in a.landing and a.release.r:
-        spin_left = a.landing['spin_rad_s'] / a.release.r
     return {
         'flight': flight.number,
         'start_ns': flight.start,
         'starts_late_s': flight.starts_late,
         'ended': flight.ended,
-        'setup': None if told is None else _setup_document(told),
+        'setup': None if configuration is None else _setup_document(configuration),
         'launch': _launch_document(a),
         'landed': a.landing is not None,
-        'flight_time_s': float(states.t[-1]) if a.landing is None else a.landing['flight_time_s'],
+        'flight_time_s': time,
         'landing_position_m': None if a.landing is None else end.tolist(),
         'end_position_m': end.tolist(),
         'range_m': math.hypot(away[0], away[1]),
         'drift_m': math.cos(heading) * away[1] - math.sin(heading) * away[0],
         'apex_m': float(position[:, 2].max()),
         'greatest_speed_m_s': float(np.linalg.norm(states.velocity, axis=1).max()),
-        'end_spin_rad_s': (a.landing or {}).get('spin_rad_s', float(states.spin[-1])),
+        'end_spin_rad_s': spin,
         'spin_left': spin_left,
         'wind': a.wind,
-        'changes': [_change_document(c, flight) for c in changes_of(flight)],
+        'changes': [_change_document(c, flight) for c in flight.changes],
         'messages': {
             'count': a.stamps.count,
             'rate_hz': a.stamps.rate,
@@ -183,49 +75,29 @@ def document(a: Analysis) -> dict[str, Any]:
     }
 
 
-def verification(a: Analysis) -> dict[str, Any]:
-    """Return what was verified as values that JSON knows."""
-    found: dict[str, Any] = {'passed': passed(a), 'checks': {}}
-    for check in a.checks:
-        found['checks'][check.name] = {'value': check.value, 'passed': check.passed}
+def verification_document(a: Analysis) -> dict[str, Any]:
+    """Return the verification as values that JSON knows."""
+    results = {c.name: {'value': c.value, 'passed': c.passed} for c in a.checks}
+    verification: dict[str, Any] = {'passed': a.passed, 'checks': results}
     if a.verdict is None:
-        found['not_flown_again'] = a.why_not
-        return found
-    found['re_flight'] = {
-        'exact': a.verdict.exact,
-        'messages': a.verdict.compared,
-        'identical_messages': a.verdict.identical,
-        'first_difference_s': a.verdict.first,
-        'largest_difference': {
-            name: x if math.isfinite(x) else None for name, x in a.verdict.largest.items()
-        },
-        'doubts': list(a.verdict.doubts),
+        return verification | {'not_flown_again': a.why_not}
+    return verification | {
+        're_flight': {
+            'exact': a.verdict.exact,
+            'messages': a.verdict.compared,
+            'identical_messages': a.verdict.identical,
+            'first_difference_s': a.verdict.first,
+            'largest_difference': {
+                name: x if math.isfinite(x) else None for name, x in a.verdict.largest.items()
+            },
+            'doubts': list(a.verdict.doubts),
+        }
     }
-    return found
 
 
-def losses(custom_data: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return what a recorder noted of losses in the `custom_data` of a bag."""
-    return [
-        (key, value)
-        for key, value in custom_data.items()
-        if _LOSSES.search(key) and value.strip() not in {'', '0', '{}', '[]'}
-    ]
-
-
-def passed(a: Analysis) -> bool:
-    """Say whether all that can be verified is as it should be."""
-    if a.verdict is not None:
-        return a.verdict.exact
-    return all(check.passed for check in a.checks)
-
-
-def _setup_document(told: Mapping[str, Any]) -> dict[str, Any]:
-    names = ('disc', 'model', 'aero', 'moment_axes', 'physics_rate', 'publish_rate', 'version')
-    return {name: told.get(name) for name in names} | {
-        'flight': told.get('flight'),
-        'wind': dict(told['wind']),
-    }
+def _setup_document(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    values = {key: configuration.get(key) for key in _SETUP}
+    return values | {Key.WIND: dict(configuration[Key.WIND])}
 
 
 def _launch_document(a: Analysis) -> dict[str, Any]:
@@ -252,18 +124,12 @@ def _launch_document(a: Analysis) -> dict[str, Any]:
 
 
 def _heading(a: Analysis) -> float:
-    """Return where the launch aimed, left of +x [rad]: the disc, or else the velocity."""
+    """Return the heading of the launch, left of +x [rad]: of the disc, or else of the velocity."""
     s = a.release
     if a.again is not None:
         return frames.flip(float(frames.euler_from_quaternion((s.e0, s.e1, s.e2, s.e3))[2]))
     vx, vy, _ = frames.flip_yz(s[3:6])
     return math.atan2(vy, vx)
-
-
-def changes_of(flight: Flight) -> list[Change]:
-    """Return what was applied during a flight."""
-    end = int(flight.motion.stamps[-1])
-    return [c for c in flight.disc.changes if flight.start <= c.stamp <= end]
 
 
 def _change_document(change: Change, flight: Flight) -> dict[str, Any]:
@@ -273,3 +139,149 @@ def _change_document(change: Change, flight: Flight) -> dict[str, Any]:
         'values': list(change.values),
         'frame': change.frame,
     }
+
+
+# ---- lines to read ----
+
+
+def summary(a: Analysis) -> str:
+    """Return an analysis in a few lines to read."""
+    d = document(a)
+    launch, setup = d['launch'], d['setup']
+    what = '' if setup is None else f'{_disc_and_model(setup)}, '
+    when = datetime.fromtimestamp(a.flight.start / NANOSECONDS, UTC)
+    turns = 'clockwise' if launch['spin_rad_s'] >= 0.0 else 'anticlockwise'
+    lines = [
+        f'  flight {a.flight.number}: {what}{when:%Y-%m-%d %H:%M:%S} UTC'
+        + (f', {d["starts_late_s"]:.3f} s of it before the bag' if d['starts_late_s'] else ''),
+        f'    launch    {launch["speed_m_s"]:.2f} m/s, pitch {_tenths(launch["pitch_deg"])}, '
+        f'roll {_tenths(launch["roll_deg"])}, yaw {_tenths(launch["yaw_deg"])}, '
+        f'angle of attack {_tenths(launch["angle_of_attack_deg"])} degrees, '
+        f'{launch["height_m"]:.2f} m up',
+        f'    spin      {launch["spin_rad_s"]:.2f} rad/s, {turns} from above',
+    ]
+    if setup is None:
+        lines.append(
+            f'    path      climbs by {_tenths(launch["climb_deg"])} degrees, heads '
+            f'{_tenths(launch["heading_deg"])} degrees right of +x; {a.wind}'
+        )
+    if launch['frame_spins']:
+        lines.append('    frame     turns with the spin: roll, pitch and yaw go round with it')
+    lines += _wind_lines(setup)
+    lines += _steering_lines(a.flight)
+    if d['landed']:
+        x, y, _ = d['landing_position_m']
+        left = '' if d['spin_left'] is None else f', {d["spin_left"]:.1%} of the spin left'
+        lines.append(
+            f'    landed    after {d["flight_time_s"]:.3f} s at x {x:.2f} m, y {y:.2f} m{left}'
+        )
+    else:
+        x, y, z = d['end_position_m']
+        lines.append(
+            f'    ended     after {d["flight_time_s"]:.3f} s in the air at x {x:.2f} m, '
+            f'y {y:.2f} m, z {z:.2f} m ({a.flight.ended})'
+        )
+    lines.append(
+        f'    range     {d["range_m"]:.2f} m, {sideways(d["drift_m"])}, apex {d["apex_m"]:.2f} m'
+    )
+    lines.append(f'    messages  {_stamps_text(a.stamps)}')
+    return '\n'.join(lines)
+
+
+def title(a: Analysis) -> str:
+    """Return one line with what flew and how far."""
+    d = document(a)
+    launch, setup = d['launch'], d['setup']
+    what = a.flight.disc.name if setup is None else _disc_and_model(setup)
+    return (
+        f'{what}: {launch["speed_m_s"]:.4g} m/s, pitch {launch["pitch_deg"]:.3g}°, '
+        f'spin {launch["spin_rad_s"]:.4g} rad/s; {d["range_m"]:.1f} m '
+        f'in {d["flight_time_s"]:.2f} s'
+    )
+
+
+def verification_text(a: Analysis) -> str:
+    """Return the verification in lines to read."""
+    v = a.verdict
+    if v is None:
+        lines = [f'    verify    not flown again: {a.why_not}']
+        for check in a.checks:
+            mark = 'ok' if check.passed else 'WRONG'
+            lines.append(f'      {check.name.replace("_", " ")}: {mark}, {check.text}')
+        return '\n'.join(lines)
+    if v.exact:
+        landed = ' and the landing' if a.flight.landing else ''
+        lines = [f'    verify    identical to the last bit: {v.compared} messages{landed}']
+        return '\n'.join(lines + [f'      note: {doubt}' for doubt in v.doubts])
+    same = '' if v.first is None else f', the first at {v.first:.3f} s'
+    lines = [
+        f'    verify    DIFFERENT: {v.compared - v.identical} of {v.compared} messages{same}; '
+        'largest differences:'
+    ]
+    apart = [_difference(name, x) for name, x in v.largest.items() if x]
+    lines += [f'      {"; ".join(apart[i : i + 4])}' for i in range(0, len(apart), 4)]
+    reasons = v.doubts or ('the bag holds no reason; messages may have been lost',)
+    return '\n'.join(lines + [f'      because: {reason}' for reason in reasons])
+
+
+def _disc_and_model(setup: Mapping[str, Any]) -> str:
+    return f'{setup[Key.DISC]}, {setup[Key.MODEL]} model'
+
+
+def _wind_lines(setup: Mapping[str, Any] | None) -> list[str]:
+    if setup is None:
+        return []
+    wind = setup[Key.WIND]
+    mean = [float(wind[axis]) for axis in 'xyz']
+    lines = []
+    if any(mean):
+        lines.append(f'    wind      {mean[0]:g} {mean[1]:g} {mean[2]:g} m/s (forward, left, up)')
+    if wind.get('turbulence'):
+        lines.append(f'    gusts     {wind["turbulence"]:g} m/s at 6 m, seed {wind["seed"]}')
+    return lines
+
+
+_STEERED = (
+    (topics.APPLIED_COEFFICIENTS, 'coefficients changed'),
+    (topics.APPLIED_MOMENT, 'the moment changed'),
+    (topics.APPLIED_WIND, 'the wind changed'),
+)
+
+
+def _steering_lines(flight: Flight) -> list[str]:
+    lines = []
+    for topic, what in _STEERED:
+        changes = [c for c in flight.changes if c.topic == topic]
+        if topic == topics.APPLIED_WIND:
+            changes = changes[1:]  # the first is the wind at the throw
+        if changes:
+            times = 'once' if len(changes) == 1 else f'{len(changes)} times'
+            at = (changes[0].stamp - flight.start) / NANOSECONDS
+            lines.append(f'    steered   {what} {times}, first at {at:.3f} s')
+    return lines
+
+
+def _stamps_text(stamps: Stamps) -> str:
+    text = f'{stamps.count} at {stamps.rate:.6g} Hz'
+    if stamps.even:
+        return f'{text}, stamps even'
+    return (
+        f'{text}, {stamps.missing} missing (longest gap {stamps.longest:.3f} s), '
+        f'{stamps.repeated} stamps repeated, {stamps.backwards} going back'
+    )
+
+
+def _tenths(x: float) -> str:
+    return f'{round(x, 1) + 0.0:.1f}'  # no minus zero
+
+
+def _difference(name: str, x: float) -> str:
+    """Return a difference to read, such as 'position x 0.1 m' for 'position.x_m'."""
+    for ending, unit in (('_rad_s', ' rad/s'), ('_m_s', ' m/s'), ('_m', ' m'), ('_s', ' s')):
+        if name.endswith(ending):
+            return f'{_words(name.removesuffix(ending))} {x:.3g}{unit}'
+    return f'{_words(name)} {x:.3g}'
+
+
+def _words(name: str) -> str:
+    return name.replace('landed.landing', 'landing').replace('.', ' ').replace('_', ' ')

@@ -1,4 +1,4 @@
-"""What can be checked and measured of a motion without knowing what moved it."""
+"""Checks and measures of a motion that need no model of the body."""
 
 from dataclasses import dataclass
 import math
@@ -6,15 +6,14 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from disc_sim_ros.analysis.flights import speeds, velocities
+from disc_sim_ros.analysis.flights import velocities
 from disc_sim_ros.analysis.odometry import Motion
-from disc_sim_ros.analysis.recording import NANOSECONDS
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics.flight_config import NANOSECONDS
 
-UNIT = 1e-3  # how far a quaternion may be from length 1; sim_node takes no worse in a throw
-FITTING = 0.05  # of the speed; by how much velocity may differ from the differences of position
-_SHORTEST = 1e-6  # length of a quaternion that tells an attitude
-_UNEVEN = 0.5  # of the usual distance of stamps; what is farther off is not even
+UNIT = 1e-3  # largest deviation of a quaternion from length 1; sim_node takes the same
+FITTING = 0.05  # of the speed; largest difference of velocity and differences of position
+_SHORTEST = 1e-6  # length of a quaternion that has an attitude
 
 
 @dataclass(frozen=True)
@@ -39,13 +38,20 @@ class Stamps:
 
     @property
     def even(self) -> bool:
-        """Say whether each stamp follows the one before at the usual distance."""
+        """Return True if each stamp follows the one before at the usual distance."""
         return not (self.missing or self.repeated or self.backwards)
 
 
 @dataclass(frozen=True)
 class Check:
-    """One check of a motion: what, how much, and whether that is all right; None: not told."""
+    """One check of a motion.
+
+    Attributes:
+        name: What is checked.
+        value: What was measured.
+        text: The same for people.
+        passed: True if the value is within its limit.
+    """
 
     name: str
     value: float
@@ -71,10 +77,10 @@ def stamps_of(motion: Motion) -> Stamps:
 
 
 def checks(motion: Motion) -> list[Check]:
-    """Return what any motion must obey: stamps, unit quaternions, velocity against position."""
+    """Return the checks that any motion must pass: stamps, quaternions, velocity and position."""
     stamps = stamps_of(motion)
     worst = float(np.abs(np.linalg.norm(motion.quaternion, axis=1) - 1.0).max())
-    found = [
+    results = [
         Check(
             'stamps',
             float(stamps.backwards + stamps.repeated),
@@ -84,8 +90,8 @@ def checks(motion: Motion) -> list[Check]:
         Check('quaternion_norm', worst, f'within {worst:.1e} of 1', worst <= UNIT),
     ]
     if motion.has_twist and len(motion) > 2:
-        found.append(_twist_check(motion))
-    return found
+        results.append(_twist_check(motion))
+    return results
 
 
 def _twist_check(motion: Motion) -> Check:
@@ -114,15 +120,15 @@ def _twist_check(motion: Motion) -> Check:
 
 def rotate(motion: Motion) -> FloatArray:
     """Return the velocities of Odometry in `frame` [m/s], shape (n, 3)."""
-    found: FloatArray = _rotation(motion).apply(motion.numbers[:, 7:10])
-    return found
+    velocity: FloatArray = _rotation(motion).apply(motion.numbers[:, 7:10])
+    return velocity
 
 
 def with_twist(motion: Motion) -> Motion:
-    """Return a motion with a twist: its own, or one by differences of its poses.
+    """Return a motion with a twist: the recorded one, or one by differences of the poses.
 
-    Rates by differences are those of the frame itself; a body that turns by more than half a turn
-    between messages seems to turn by less.
+    Rates by differences are those of the frame itself. If the body turns by more than half a turn
+    between messages, they are too small.
     """
     if motion.has_twist:
         return motion
@@ -138,9 +144,10 @@ def with_twist(motion: Motion) -> Motion:
 
 
 def ground_crossing(motion: Motion) -> tuple[float, FloatArray] | None:
-    """Return when z = 0 is last crossed from above [s after the first message], and where.
+    """Return the time [s after the first message] and place of the last descent through z = 0.
 
-    The place has shape (3,) [m]; it is interpolated between two messages. None where it is not.
+    The place has shape (3,) [m]; both are interpolated between two messages. None if the motion
+    does not descend through z = 0.
     """
     z = motion.position[:, 2]
     below = np.flatnonzero((z[:-1] > 0.0) & (z[1:] <= 0.0))
@@ -154,7 +161,7 @@ def ground_crossing(motion: Motion) -> tuple[float, FloatArray] | None:
 
 
 def turns_with_spin(motion: Motion) -> bool:
-    """Say whether the frame of a motion is fixed in what spins: its x axis goes round with it."""
+    """Return True if the frame of a motion is fixed to the spinning body, so that it turns too."""
     if not motion.has_twist or len(motion) < 2:
         return False
     dt = float(np.median(np.diff(motion.stamps))) / NANOSECONDS
@@ -162,13 +169,8 @@ def turns_with_spin(motion: Motion) -> bool:
     if dt <= 0.0 or abs(rate * dt) > math.pi or abs(rate) < 1.0:
         return False
     rotation = _rotation(motion)
-    seen = float(np.median((rotation[:-1].inv() * rotation[1:]).as_rotvec()[:, 2])) / dt
-    return abs(seen - rate) < abs(seen)
-
-
-def greatest_speed(motion: Motion) -> float:
-    """Return the greatest speed [m/s]."""
-    return float(speeds(motion).max())
+    of_frame = float(np.median((rotation[:-1].inv() * rotation[1:]).as_rotvec()[:, 2])) / dt
+    return abs(of_frame - rate) < abs(of_frame)
 
 
 def _rotation(motion: Motion) -> Rotation:

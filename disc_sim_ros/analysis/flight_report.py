@@ -1,4 +1,4 @@
-"""A flight as a document for programs, a table for spreadsheets and a summary to read."""
+"""Reports of a simulated flight: a document for programs, a table, and a summary to read."""
 
 from dataclasses import asdict
 import math
@@ -21,7 +21,7 @@ def document(flight: Flight) -> dict[str, Any]:
     of the launch heading it ended, `apex_m` the greatest height above the ground. The landing is
     null for a flight that ended in the air. Sampled arrays come with the samples.
     """
-    found: dict[str, Any] = {
+    values: dict[str, Any] = {
         'version': __version__,
         'launch': launch_document(flight),
         'landed': flight.landed,
@@ -34,13 +34,13 @@ def document(flight: Flight) -> dict[str, Any]:
         'end_spin_rad_s': flight.end.r,
     }
     if len(flight.trajectory):
-        for name, values in columns(flight.trajectory).items():
-            found[name] = [_plain(value) for value in values.tolist()]
-    return found
+        for name, column in columns(flight.trajectory).items():
+            values[name] = [_plain(value) for value in column.tolist()]
+    return values
 
 
 def launch_document(flight: Flight) -> dict[str, Any]:
-    """Return all that a repetition of the flight needs, with units in the keys."""
+    """Return all values that are needed to repeat the flight, with units in the keys."""
     launch, setup, control = flight.launch, flight.setup, flight.control
     return {
         'disc': setup.disc.name,
@@ -145,27 +145,27 @@ def summary(flight: Flight) -> str:
 
 def samples_text(trajectory: Trajectory) -> str:
     """Return the samples as an aligned table to read."""
-    found = columns(trajectory)
+    samples = columns(trajectory)
     head = '     t s      x m      y m      z m   V m/s  alpha   roll  pitch lambda   spin  AdvR'
     lines = [head]
-    position = found['position_m']
+    position = samples['position_m']
     angles = ('alpha_deg', 'roll_deg', 'pitch_deg', 'absolute_attitude_deg')
     for i, t in enumerate(trajectory.t):
         x, y, z = position[i]
-        line = f'{t:8.3f} {x:8.3f} {y:8.3f} {z:8.3f} {found["airspeed_m_s"][i]:7.2f}'
-        line += ''.join(f' {found[name][i]:6.1f}' for name in angles)
-        line += f' {found["spin_rad_s"][i]:6.2f} {found["advance_ratio"][i]:5.2f}'
+        line = f'{t:8.3f} {x:8.3f} {y:8.3f} {z:8.3f} {samples["airspeed_m_s"][i]:7.2f}'
+        line += ''.join(f' {samples[name][i]:6.1f}' for name in angles)
+        line += f' {samples["spin_rad_s"][i]:6.2f} {samples["advance_ratio"][i]:5.2f}'
         lines.append(line)
     return '\n'.join(lines)
 
 
 def sideways(drift: float) -> str:
-    """Return how far left (positive) or right something ended, to read."""
+    """Return a drift in words; positive is left [m]."""
     return f'drift {abs(drift):.2f} m to the {"left" if drift >= 0.0 else "right"}'
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers that JSON does not know as null."""
+    """Return None, JSON's null, for numbers that JSON does not know."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -7,21 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from disc_sim_ros.analysis.odometry import Motion
-from disc_sim_ros.analysis.recording import NANOSECONDS, Disc, Event, Flight
+from disc_sim_ros.analysis.recording import END_OF_BAG, THROWN_AGAIN, Disc, Event, Flight
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics.flight_config import NANOSECONDS
+from disc_sim_ros.topics import FlightEvent
 
 GAP = 0.5  # s without a message, or ten times the usual distance of messages where that is more
 JUMP = 1.0  # m between two messages beyond what the velocity explains
 MOVING = 0.5  # m/s; slower is at rest
 SHORTEST = 0.1  # s
-ENDING = ('reset', 'failed')
+ENDING = (FlightEvent.RESET, FlightEvent.FAILED)  # events that end a flight in the air
 
 
 def flights(disc: Disc) -> list[Flight]:
     """Return the flights of a disc.
 
-    They begin with the throws that sim_node tells of. In a bag without these they are the times
-    in which something moves, without a gap in time or a jump in place.
+    They begin with the throws that sim_node reports. In a bag without throws, a flight is a time
+    in which the body moves, without a gap in time or a jump in place.
     """
     if disc.releases:
         return list(_thrown(disc))
@@ -33,12 +35,12 @@ def _thrown(disc: Disc) -> Iterator[Flight]:
     ends: list[int | None] = [release.stamp for release in disc.releases[1:]]
     number = 0
     for release, following in zip(disc.releases, [*ends, None], strict=True):
-        end, ended = following, 'thrown again' if following else 'end of the bag'
+        end, ended = following, THROWN_AGAIN if following else END_OF_BAG
         ending = _first(disc, ENDING, release.stamp, following)
         if ending is not None:
             end, ended = ending.stamp, ending.name
-        landing = _first(disc, ('landed',), release.stamp, end)
-        # Where time stood still, the release has the stamp of a message of the disc at rest.
+        landing = _first(disc, (FlightEvent.LANDED,), release.stamp, end)
+        # If time stood still, the release has the stamp of a message of the disc at rest.
         first = max(int(np.searchsorted(stamps, release.stamp, 'right')) - 1, 0)
         if stamps[first] < release.stamp or not disc.motion.numbers[first, 7:].any():
             first += 1
@@ -52,7 +54,7 @@ def _thrown(disc: Disc) -> Iterator[Flight]:
                 slice(first, last),
                 release,
                 landing,
-                'landed' if landing else ended,
+                FlightEvent.LANDED if landing else ended,
             )
 
 
@@ -95,16 +97,16 @@ def _pieces(motion: Motion) -> Iterator[tuple[int, int, str]]:
         jump &= moved > 200.0 * steps / NANOSECONDS
     breaks = np.flatnonzero(gap | jump) + 1
     for begin, end in pairwise([0, *breaks.tolist(), len(motion)]):
-        why = 'end of the bag'
+        why = END_OF_BAG
         if end < len(motion):
             why = 'gap' if gap[end - 1] else 'jump'
         if end - begin > 1:
             yield begin, end, why
 
 
-def _runs(claims: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _runs(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """Yield begin and end of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], claims, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
@@ -120,7 +122,7 @@ def speeds(motion: Motion) -> FloatArray:
 def velocities(motion: Motion) -> FloatArray:
     """Return the velocity in `frame` by differences of the position [m/s], shape (n, 3).
 
-    Messages with the stamp of the one before count as if they came a nanosecond later.
+    A message with the stamp of the one before counts as one nanosecond later.
     """
     if len(motion) < 2:
         return np.zeros((len(motion), 3))

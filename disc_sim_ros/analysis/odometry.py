@@ -1,26 +1,24 @@
-"""Recorded motion as arrays: Odometry and PoseStamped taken out of their bytes, without ROS."""
+"""Recorded motion as arrays: the numbers of Odometry and PoseStamped bytes, without ROS."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
-from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.bags.reader import RawMessage
 from disc_sim_ros.errors import BagError
+from disc_sim_ros.physics.flight_config import NANOSECONDS
+from disc_sim_ros.topics import MessageType
 
-IntArray = NDArray[np.int64]
-
-ODOMETRY = 'nav_msgs/msg/Odometry'
-POSE = 'geometry_msgs/msg/PoseStamped'
+ODOMETRY, POSE = MessageType.ODOMETRY, MessageType.POSE
 COMPONENTS = (
     *(f'position.{axis}_m' for axis in 'xyz'),
     *(f'orientation.{axis}' for axis in 'xyzw'),
     *(f'velocity.{axis}_m_s' for axis in 'xyz'),
     *(f'rate.{axis}_rad_s' for axis in 'xyz'),
-)  # of an Odometry, in the order of `Motion.numbers`
+)  # names of the numbers of `frames.odometry`, with units
 _STAMP = slice(4, 12)
 _PREFIX = 12  # bytes of encapsulation and stamp
 _LATEST = 2**63 - 1  # ns; a damaged log time may be later
@@ -35,7 +33,7 @@ class Motion:
 
     Attributes:
         topic: Its topic.
-        frame: In which its pose is given.
+        frame: The frame of its pose.
         child: The frame of the body; empty for a PoseStamped.
         stamps: Of the headers [ns], shape (n,).
         log: When they were received [ns], shape (n,).
@@ -54,8 +52,13 @@ class Motion:
         return len(self.stamps)
 
     @property
+    def namespace(self) -> str:
+        """Return the namespace of its topic, such as '/red'; empty for the root."""
+        return self.topic.rpartition('/')[0]
+
+    @property
     def has_twist(self) -> bool:
-        """Say whether velocity and rates were recorded."""
+        """Return True if velocity and rates were recorded."""
         return int(self.numbers.shape[1]) > 7
 
     @property
@@ -81,35 +84,35 @@ class Motion:
 
 
 def motions(messages: Iterable[RawMessage], type_name: str) -> list[Motion]:
-    """Return the motions in the messages of topics of one type, one a topic and child frame.
+    """Return the motions in the messages of one type: one for each topic and child frame.
 
     Args:
-        messages: Of this type.
+        messages: Messages of this type.
         type_name: ODOMETRY or POSE.
 
     Raises:
-        BagError: The bytes are no such message.
+        BagError: The bytes are not such a message.
     """
-    kinds: dict[bytes, _Kind] = {}
-    found: dict[tuple[str, str, str], list[RawMessage]] = {}
-    starts: dict[tuple[str, str, str], _Kind] = {}
+    layouts: dict[bytes, _Layout] = {}
+    groups: dict[tuple[str, str, str], list[RawMessage]] = {}
+    layout_of: dict[tuple[str, str, str], _Layout] = {}
     for message in messages:
         data = message.data
-        kind = next((k for text, k in kinds.items() if data.startswith(text, _PREFIX)), None)
-        if kind is None or data[:4] != kind.head:
-            kind = _kind(message, type_name)
-            kinds[data[_PREFIX : kind.text_end]] = kind
-        if len(data) < kind.start + 8 * _DOUBLES[type_name]:
+        layout = next((k for text, k in layouts.items() if data.startswith(text, _PREFIX)), None)
+        if layout is None or data[:4] != layout.head:
+            layout = _layout(message, type_name)
+            layouts[data[_PREFIX : layout.text_end]] = layout
+        if len(data) < layout.start + 8 * _DOUBLES[type_name]:
             raise BagError(f'{message.topic}: a message is too short for {type_name}')
-        key = (message.topic, kind.frame, kind.child)
-        found.setdefault(key, []).append(message)
-        starts[key] = kind
-    return [_motion(key, group, starts[key], type_name) for key, group in found.items()]
+        key = (message.topic, layout.frame, layout.child)
+        groups.setdefault(key, []).append(message)
+        layout_of[key] = layout
+    return [_motion(key, group, layout_of[key], type_name) for key, group in groups.items()]
 
 
 @dataclass(frozen=True, slots=True)
-class _Kind:
-    """Where the numbers are in messages that begin alike."""
+class _Layout:
+    """Where the numbers are in messages with the same encapsulation and the same frames."""
 
     head: bytes
     order: str
@@ -119,7 +122,7 @@ class _Kind:
     start: int  # of the first double
 
 
-def _kind(message: RawMessage, type_name: str) -> _Kind:
+def _layout(message: RawMessage, type_name: str) -> _Layout:
     data = message.data
     if len(data) < _PREFIX or data[0] != 0 or data[1] not in {0, 1}:
         raise BagError(f'{message.topic}: a message is not serialised as CDR')
@@ -132,29 +135,29 @@ def _kind(message: RawMessage, type_name: str) -> _Kind:
             texts.append(data[at + 4 : at + 3 + length].decode())
             at += 4 + length
     except (struct.error, UnicodeDecodeError):
-        raise BagError(f'{message.topic}: a message is no {type_name}') from None
+        raise BagError(f'{message.topic}: a message is not a {type_name}') from None
     start = at + (4 - at) % 8  # alignment counts from behind the encapsulation
     frame, child = (*texts, '')[:2]
-    return _Kind(data[:4], order, frame, child, at, start)
+    return _Layout(data[:4], order, frame, child, at, start)
 
 
 def _motion(
-    key: tuple[str, str, str], group: list[RawMessage], kind: _Kind, type_name: str
+    key: tuple[str, str, str], group: list[RawMessage], layout: _Layout, type_name: str
 ) -> Motion:
-    size, start = 8 * _DOUBLES[type_name], kind.start
+    size, start = 8 * _DOUBLES[type_name], layout.start
     stamps = np.frombuffer(
         b''.join(m.data[_STAMP] for m in group),
-        dtype=[('sec', f'{kind.order}i4'), ('nanosec', f'{kind.order}u4')],
+        dtype=[('sec', f'{layout.order}i4'), ('nanosec', f'{layout.order}u4')],
     )
     doubles = np.frombuffer(
-        b''.join(m.data[start : start + size] for m in group), dtype=f'{kind.order}f8'
+        b''.join(m.data[start : start + size] for m in group), dtype=f'{layout.order}f8'
     ).reshape(len(group), -1)
     parts = [doubles[:, :7]]
     if type_name == ODOMETRY:
         parts.append(doubles[:, _TWIST_AT:])
     return Motion(
         *key,
-        stamps=stamps['sec'].astype(np.int64) * 1_000_000_000 + stamps['nanosec'],
+        stamps=stamps['sec'].astype(np.int64) * NANOSECONDS + stamps['nanosec'],
         log=np.array([min(m.log_time, _LATEST) for m in group], dtype=np.int64),
         numbers=np.hstack(parts).astype(float),
     )

@@ -1,15 +1,29 @@
-"""Plots of one flight: the two views and the time histories of the paper's Fig. 5."""
+"""Plots of simulated and of recorded flights: two views to scale, and time histories."""
 
 from io import BytesIO
+from typing import TYPE_CHECKING
 import warnings
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+import numpy as np
 
+from disc_sim_ros import topics
 from disc_sim_ros.analysis.flight_report import columns
-from disc_sim_ros.physics.flight import Flight
+from disc_sim_ros.physics.flight_config import NANOSECONDS
 
-BLUE, ORANGE = '#0072b2', '#d55e00'  # Okabe and Ito: safe for colour-blind readers
+if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly` does without
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from disc_sim_ros.analysis.bag_analysis import Analysis
+    from disc_sim_ros.analysis.recording import Change
+    from disc_sim_ros.physics.flight import Flight
+
+# Okabe and Ito: safe for colour-blind readers.
+COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#000000')
+BLUE, ORANGE = COLOURS[:2]
 _HISTORIES = (
     ('airspeed_m_s', 'airspeed, m/s'),
     ('alpha_deg', 'angle of attack, °'),
@@ -18,12 +32,18 @@ _HISTORIES = (
     ('absolute_attitude_deg', 'absolute attitude, °'),
     ('spin_rad_s', 'spin, rad/s'),
 )
+_INPUT_LABELS = {
+    topics.APPLIED_COEFFICIENTS: (('C_L', 'C_M', 'C_N'), 'control coefficients'),
+    topics.APPLIED_MOMENT: (('x', 'y', 'z'), 'control moment, N m'),
+}
+_STYLES = ('-', '--', ':')
+_LEGEND_LIMIT = 8  # flights in a legend, at most
 
 
-def flight_figure(flight: Flight) -> Figure:
+def flight_figure(flight: 'Flight') -> Figure:
     """Return a figure of a sampled flight: side and top view to scale, and its time histories."""
-    found = columns(flight.trajectory)
-    x, y, z = found['position_m'].T
+    samples = columns(flight.trajectory)
+    x, y, z = samples['position_m'].T
     figure = Figure(figsize=(11, 9), layout='constrained')
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(4, 2, height_ratios=(1.2, 1, 1, 1))
@@ -41,10 +61,10 @@ def flight_figure(flight: Flight) -> Figure:
     side.legend(loc='best')
     for i, (name, label) in enumerate(_HISTORIES):
         axis = figure.add_subplot(grid[1 + i // 2, i % 2])
-        axis.plot(found['t_s'], found[name], color=BLUE)
+        axis.plot(samples['t_s'], samples[name], color=BLUE)
         axis.set(xlabel='time, s', ylabel=label)
     ratio = axis.twinx()
-    ratio.plot(found['t_s'], found['advance_ratio'], color=ORANGE, ls='--')
+    ratio.plot(samples['t_s'], samples['advance_ratio'], color=ORANGE, ls='--')
     ratio.set_ylabel('advance ratio (dashed)')
     for axis in figure.axes:
         axis.grid(alpha=0.3)
@@ -58,11 +78,99 @@ def flight_figure(flight: Flight) -> Figure:
     return figure
 
 
+def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
+    """Return a figure of one or more recorded flights.
+
+    Side and top view to scale, height, airspeed, angle of attack and spin over the time since
+    each release, and the control inputs where there were any.
+    """
+    inputs = [topic for topic in _INPUT_LABELS if any(_inputs(a, topic) for a in analyses)]
+    rows = 3 + bool(inputs)
+    figure = Figure(figsize=(11, 2.0 + 2.4 * rows), layout='constrained')
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(rows, 2, height_ratios=(1.3, *[1.0] * (rows - 1)))
+    side, top = (figure.add_subplot(grid[0, i]) for i in range(2))
+    histories = [figure.add_subplot(grid[1 + i // 2, i % 2]) for i in range(4)]
+    for i, a in enumerate(analyses):
+        colour = COLOURS[i % len(COLOURS)]
+        name = f'{a.flight.disc.name}, flight {a.flight.number}'
+        _views(side, top, a, colour, name)
+        _histories(histories, a, colour)
+    for axis, across in ((side, 'height z, m'), (top, 'left y, m')):
+        axis.set(xlabel='forward x, m', ylabel=across)
+        axis.set_aspect('equal', adjustable='datalim')
+    side.axhline(0.0, color='0.6', lw=0.8)
+    if 1 < len(analyses) <= _LEGEND_LIMIT:
+        side.legend(loc='best')
+    air = 'airspeed' if any(a.wind_is_known for a in analyses) else 'speed over the ground'
+    labels = ('height, m', f'{air}, m/s', 'angle of attack, °', 'spin, rad/s')
+    for axis, label in zip(histories, labels, strict=True):
+        axis.set(xlabel='time, s', ylabel=label)
+    for i, topic in enumerate(inputs):
+        place = grid[3, :] if len(inputs) == 1 else grid[3, i]
+        _steering(figure.add_subplot(place), analyses, topic)
+    for axis in figure.axes:
+        axis.grid(alpha=0.3)
+    figure.suptitle(heading, parse_math=False)  # a path may have dollars in it
+    return figure
+
+
+def _views(side: 'Axes', top: 'Axes', a: 'Analysis', colour: str, name: str) -> None:
+    x, y, z = columns(a.trajectory)['position_m'].T
+    for axis, across in ((side, z), (top, y)):
+        axis.plot(x, across, color=colour, label=name)
+        axis.plot(x[0], across[0], 'o', color=colour)
+    if a.landing is not None:
+        for axis, across in ((side, 0.0), (top, a.landing.y)):
+            axis.plot(a.landing.x, across, 'x', color=colour, ms=9, mew=2)
+
+
+def _histories(histories: 'Sequence[Axes]', a: 'Analysis', colour: str) -> None:
+    samples = columns(a.trajectory)
+    values = (
+        samples['position_m'][:, 2],
+        samples['airspeed_m_s'],
+        samples['alpha_deg'],
+        samples['spin_rad_s'],
+    )
+    for axis, history in zip(histories, values, strict=True):
+        axis.plot(samples['t_s'], history, color=colour)
+
+
+def _steering(axis: 'Axes', analyses: 'Sequence[Analysis]', topic: str) -> None:
+    """Draw the inputs of a topic as steps."""
+    names, label = _INPUT_LABELS[topic]
+    steered = [(i, a, _inputs(a, topic)) for i, a in enumerate(analyses) if _inputs(a, topic)]
+    for i, a, changes in steered:
+        times = [(c.stamp - a.flight.start) / NANOSECONDS for c in changes]
+        values = np.array([c.values for c in changes])
+        end = float(a.trajectory.t[-1])
+        rows = np.vstack([np.zeros(3), values, values[-1]])
+        for j, name in enumerate(names):
+            axis.step(
+                [min(0.0, *times), *times, max(end, *times)],
+                rows[:, j],
+                where='post',
+                color=COLOURS[i % len(COLOURS)] if len(analyses) > 1 else COLOURS[j],
+                ls=_STYLES[j],
+                label=name if a is steered[0][1] else None,
+            )
+    axis.set(xlabel='time, s', ylabel=label)
+    axis.legend(loc='best')
+
+
+def _inputs(a: 'Analysis', topic: str) -> 'list[Change]':
+    """Return the changes of a topic during a flight, up to its landing."""
+    start = a.flight.start
+    end = start + round(float(a.trajectory.t[-1]) * NANOSECONDS)
+    return [c for c in a.flight.disc.changes if c.topic == topic and start <= c.stamp <= end]
+
+
 def image(figure: Figure, kind: str) -> bytes:
     """Return a figure as the bytes of a file of the `kind` 'png', 'svg' or 'pdf'."""
     buffer = BytesIO()
     with warnings.catch_warnings():
-        # The name of a disc in a script that the font lacks shows as boxes, and that is enough.
+        # A disc name in a script that the font lacks is drawn as boxes, without a warning.
         warnings.filterwarnings('ignore', message='Glyph .* missing from font')
         figure.savefig(buffer, format=kind, dpi=120)
     return buffer.getvalue()

@@ -1,50 +1,46 @@
-"""What a bag tells of discs: whose motion it holds, their flights, commands and events."""
+"""What a bag holds of discs: their motion, throws, events, commands and wind."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-import re
 from typing import Any
 
 import numpy as np
-import yaml
 
+from disc_sim_ros import topics
 from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, Motion, motions
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.bags.reader import Bag, Message
 from disc_sim_ros.errors import BagError
+from disc_sim_ros.physics.flight_config import (
+    NANOSECONDS,
+    EventKey,
+    Key,
+    document_of,
+    nanoseconds_of,
+    release_of,
+)
 from disc_sim_ros.physics.frames import odometry_array
-from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.topics import FlightEvent, Frames
 
-NANOSECONDS = 1_000_000_000
-APPLIED = ('applied_moment', 'applied_coefficients', 'applied_wind')
-_SIBLINGS = {  # topics of sim_node beside its odometry, and their types
-    'configuration': 'std_msgs/msg/String',
-    'release': ODOMETRY,
-    'flight_events': 'diagnostic_msgs/msg/DiagnosticStatus',
-    'applied_moment': 'geometry_msgs/msg/WrenchStamped',
-    'applied_coefficients': 'geometry_msgs/msg/Vector3Stamped',
-    'applied_wind': 'geometry_msgs/msg/Vector3Stamped',
-}
-_PARAMETER_EVENTS = '/parameter_events'
-_TOLD = ('disc', 'model', 'physics_rate', 'publish_rate', 'ground')  # by a configuration, at least
-_NOT_MOTION = ('release', 'throw')  # of type Odometry, but single states
-_WIND_PROFILE = ('wind.roughness_length', 'wind.reference_height')
-# A release message and a configuration tell the same but for p and q, which the precession model
-# sets itself: its numbers but these.
+END_OF_BAG, THROWN_AGAIN = 'end of the bag', 'thrown again'
+_SINGLE_STATES = (topics.RELEASE, topics.THROW)  # of type Odometry, but not a motion
+# The numbers that a release message and a configuration have in common. Not p and q, 10 and 11:
+# the precession model sets these itself.
 _RELEASED = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12]
 _ROUNDING = 1e-12  # a release message is made after the quaternion was brought to unit length
+_TOGETHER = 2 * NANOSECONDS  # of log time: a release and its configuration are sent together
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Something that acts from a time on: control inputs, or the mean wind.
+    """Control inputs, or a mean wind, that act from a time on.
 
     Attributes:
-        topic: Last name of its topic, one of APPLIED.
-        stamp: From when [ns].
+        topic: Last name of its topic, one of `topics.APPLIED`.
+        stamp: When it begins to act [ns].
         values: As in the message.
-        frame: In which they are given.
+        frame: The frame of the values.
     """
 
     topic: str
@@ -58,9 +54,9 @@ class Event:
     """A flight event.
 
     Attributes:
-        name: Such as 'landed'.
-        stamp: When [ns].
-        values: Its other values.
+        name: Such as 'landed', see `topics.FlightEvent`.
+        stamp: When it happened [ns].
+        values: Its other values, by `flight_config.EventKey` and the fields of `Landing`.
     """
 
     name: str
@@ -70,7 +66,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Release:
-    """A throw: when, and its configuration, the document that sim_node publishes; or None."""
+    """A throw: its time [ns], and the document of its configuration, or None."""
 
     stamp: int
     configuration: Mapping[str, Any] | None
@@ -78,7 +74,7 @@ class Release:
 
 @dataclass(frozen=True, eq=False)
 class Disc:
-    """All that a bag tells of one disc.
+    """All that a bag holds of one disc.
 
     Attributes:
         motion: All its messages.
@@ -99,14 +95,14 @@ class Disc:
     @property
     def namespace(self) -> str:
         """Return the namespace of its topics, such as '/red'; empty for the root."""
-        return self.motion.topic.rpartition('/')[0]
+        return self.motion.namespace
 
     @property
     def name(self) -> str:
-        """Return what to call it: its frame, or the namespace where that says more."""
-        child = self.motion.child
-        if child not in {'', 'disc'}:
-            return child.removesuffix('/disc') or child
+        """Return its name in reports: its frame, or the namespace where that tells it apart."""
+        child, plain = self.motion.child, Frames().disc
+        if child not in {'', plain}:
+            return child.removesuffix(f'/{plain}') or child
         return self.namespace.strip('/') or child or self.motion.topic
 
 
@@ -115,14 +111,14 @@ class Flight:
     """One flight of a disc.
 
     Attributes:
-        disc: Whose.
+        disc: The disc.
         number: From 1, in the order of the bag.
         start: Stamp of the release, or of the first message [ns].
-        rows: Messages of `disc.motion` that tell of it, until the next begins.
+        rows: Its messages in `disc.motion`, up to the next flight.
         release: The throw; None where no such message was recorded.
         landing: The event; None where none was recorded.
         ended: What ended it: 'landed', 'thrown again', 'reset', 'failed' or 'end of the bag', and
-            of bags of others 'rest', 'gap' or 'jump'.
+            in bags of other recorders 'rest', 'gap' or 'jump'.
     """
 
     disc: Disc
@@ -131,12 +127,23 @@ class Flight:
     rows: slice
     release: Release | None = None
     landing: Event | None = None
-    ended: str = 'end of the bag'
+    ended: str = END_OF_BAG
 
     @cached_property
     def motion(self) -> Motion:
         """Return its messages."""
         return self.disc.motion.part(self.rows)
+
+    @property
+    def configuration(self) -> Mapping[str, Any] | None:
+        """Return the document of its configuration; None where none was recorded."""
+        return None if self.release is None else self.release.configuration
+
+    @property
+    def changes(self) -> list[Change]:
+        """Return what was applied from the release to the last message, in order."""
+        end = int(self.motion.stamps[-1])
+        return [c for c in self.disc.changes if self.start <= c.stamp <= end]
 
     @property
     def time(self) -> FloatArray:
@@ -145,17 +152,18 @@ class Flight:
 
     @property
     def starts_late(self) -> float:
-        """Return how long after the release the first message is [s]."""
+        """Return the time from the release to the first message [s]."""
         return float(self.motion.stamps[0] - self.start) / NANOSECONDS
 
 
 @dataclass(frozen=True)
-class _Told:
+class _Messages:
     """Decoded messages by topic."""
 
     by_topic: dict[str, list[Message]] = field(default_factory=dict)
 
     def of(self, namespace: str, name: str) -> list[Message]:
+        """Return the messages of a topic of a namespace, in order of arrival."""
         return self.by_topic.get(f'{namespace}/{name}', [])
 
 
@@ -168,28 +176,31 @@ def discs(bag: Bag, topic: str | None = None) -> list[Disc]:
             namespace without one.
 
     Raises:
-        BagError: There is nothing that moves; it names what there is.
+        BagError: The bag holds no motion; the message lists its topics.
     """
     if not bag.message_count:
         raise BagError(f'{bag.path}: the bag is empty')
     moving = _moving_topics(bag, topic)
-    found: list[Motion] = []
+    bodies: list[Motion] = []
     for kind in (ODOMETRY, POSE):
         names = [name for name, of in moving.items() if of == kind]
         if names:
-            found += motions(bag.raw(names), kind)
-    if not found:
+            bodies += motions(bag.raw(names), kind)
+    if not bodies:
         raise BagError(f'{bag.path}: {", ".join(moving)}: no messages; {_contents(bag)}')
-    spaces = {motion.topic.rpartition('/')[0] for motion in found}
-    types = {f'{space}/{name}': kind for space in spaces for name, kind in _SIBLINGS.items()}
-    types[_PARAMETER_EVENTS] = 'rcl_interfaces/msg/ParameterEvent'
+    types = {
+        f'{space}/{name}': kind
+        for space in {motion.namespace for motion in bodies}
+        for name, kind in topics.FLIGHT_TOPICS.items()
+    }
+    types[topics.NodeTopic.PARAMETER_EVENTS] = topics.MessageType.PARAMETER_EVENT
     known = {i.topic.name: i for i in bag.topics if types.get(i.topic.name) == i.topic.type}
-    told: dict[str, list[Message]] = {}
+    messages = _Messages()
     for message in bag.messages([name for name, info in known.items() if info.message_count]):
-        told.setdefault(message.topic, []).append(message)
+        messages.by_topic.setdefault(message.topic, []).append(message)
     try:
-        return [_disc(motion, found, _Told(told), set(known)) for motion in found]
-    except (AttributeError, TypeError, ValueError) as error:  # by a damaged definition
+        return [_disc(motion, bodies, messages, set(known)) for motion in bodies]
+    except (AttributeError, TypeError, ValueError) as error:  # a damaged definition
         raise BagError(f'{bag.path}: a message is not what its topic says ({error})') from None
 
 
@@ -209,7 +220,7 @@ def _moving_topics(bag: Bag, topic: str | None) -> dict[str, str]:
     odometry = [
         name
         for name, kind in types.items()
-        if kind == ODOMETRY and name in filled and name.rpartition('/')[2] not in _NOT_MOTION
+        if kind == ODOMETRY and name in filled and name.rpartition('/')[2] not in _SINGLE_STATES
     ]
     spaces = {name.rpartition('/')[0] for name in odometry}
     poses = [
@@ -223,47 +234,45 @@ def _moving_topics(bag: Bag, topic: str | None) -> dict[str, str]:
 
 
 def _contents(bag: Bag) -> str:
-    """Return what is in a bag, for an error."""
+    """Return the topics of a bag, for an error."""
     filled = [info for info in bag.topics if info.message_count]
     return 'it holds ' + ', '.join(f'{i.topic.name} ({i.topic.type})' for i in filled)
 
 
-def _disc(motion: Motion, others: Iterable[Motion], told: _Told, known: set[str]) -> Disc:
-    """Return what is told of one disc; discs that share topics differ in their frames."""
-    space = motion.topic.rpartition('/')[0]
-    alone = sum(m.topic.rpartition('/')[0] == space for m in others) == 1
-    prefix = motion.child.removesuffix('disc')
-    frames = {prefix + name for name in ('disc', 'disc_body', 'disc_air')}
-
-    def own(frame: str) -> bool:
-        return alone or frame in frames
-
+def _disc(motion: Motion, bodies: Iterable[Motion], messages: _Messages, known: set[str]) -> Disc:
+    """Return all that is recorded of one disc; discs that share topics differ in their frames."""
+    space = motion.namespace
+    alone = sum(body.namespace == space for body in bodies) == 1
+    names = Frames.of_disc(motion.child)
+    own = {names.disc, names.disc_body, names.disc_air}
     changes = [
         change
-        for name in APPLIED
-        for change in map(_change, told.of(space, name))
-        if own(change.frame) or name == 'applied_wind'
+        for name in topics.APPLIED
+        for change in map(_change, messages.of(space, name))
+        if alone or change.frame in own or name == topics.APPLIED_WIND
     ]
     events = [
         _event(message)
-        for message in told.of(space, 'flight_events')
+        for message in messages.of(space, topics.FLIGHT_EVENTS)
         if alone or message.value.hardware_id == motion.child
     ]
+    releases = _releases(motion.child, space, messages, events, alone=alone)
     return Disc(
         motion=motion,
-        releases=tuple(
-            sorted(_releases(motion.child, space, told, events, alone=alone), key=_stamp)
-        ),
+        releases=tuple(sorted(releases, key=_stamp)),
         events=tuple(events),
         changes=tuple(sorted(changes, key=_stamp)),
-        topics=frozenset(n for n in _SIBLINGS if f'{space}/{n}' in known),
-        profile_changes=tuple(
-            message.log_time
-            for message in told.of('', 'parameter_events')
-            if message.value.node.rpartition('/')[0] == space
-            and any(p.name in _WIND_PROFILE for p in message.value.changed_parameters)
-        ),
+        topics=frozenset(n for n in topics.FLIGHT_TOPICS if f'{space}/{n}' in known),
+        profile_changes=tuple(_profile_changes(space, messages)),
     )
+
+
+def _profile_changes(space: str, messages: _Messages) -> Iterator[int]:
+    """Yield the log times of changes of the wind's profile, by parameters of sim_node [ns]."""
+    for message in messages.by_topic.get(topics.NodeTopic.PARAMETER_EVENTS, []):
+        names = {parameter.name for parameter in message.value.changed_parameters}
+        if message.value.node.rpartition('/')[0] == space and names & set(topics.WIND_PROFILE):
+            yield message.log_time
 
 
 def _change(message: Message) -> Change:
@@ -279,85 +288,67 @@ def _change(message: Message) -> Change:
 
 def _event(message: Message) -> Event:
     values = {item.key: item.value for item in message.value.values}
-    stamp = _seconds(values.pop('stamp_s', ''))
+    stamp = nanoseconds_of(values.pop(EventKey.STAMP, ''))
     at = message.log_time if stamp is None else stamp
-    return Event(message.value.name.rpartition(': ')[2], at, values)
+    return Event(topics.event_of(message.value.name), at, values)
 
 
 def _releases(
-    child: str, space: str, told: _Told, events: Iterable[Event], *, alone: bool
-) -> Iterable[Release]:
+    child: str, space: str, messages: _Messages, events: Iterable[Event], *, alone: bool
+) -> Iterator[Release]:
     """Yield the throws of a disc; discs that share topics differ in the frame of the release."""
-    numbers = {e.stamp: e.values.get('flight') for e in events if e.name == 'thrown'}
-    for message, document in _configured(space, told):
+    numbers = {e.stamp: e.values.get(EventKey.FLIGHT) for e in events if _is_throw(e)}
+    for message, document in _configured(space, messages):
         if alone or message.value.child_frame_id == child:
             stamp = _ns(message.value.header.stamp)
             numbers.pop(stamp, None)
             yield Release(stamp, document)
-    documents = [d for _, d in _documents(space, told)]
+    documents = [document for _, document in _documents(space, messages)]
     for stamp, number in numbers.items():  # where `release` was not recorded
-        mine = [d for d in documents if alone and str(d.get('flight')) == number]
-        yield Release(stamp, mine[0] if len(mine) == 1 else None)
+        fitting = [d for d in documents if alone and str(d.get(Key.FLIGHT)) == number]
+        yield Release(stamp, fitting[0] if len(fitting) == 1 else None)
 
 
-def _configured(space: str, told: _Told) -> Iterable[tuple[Message, Mapping[str, Any] | None]]:
-    """Yield each release with its configuration, which names no disc: by the state, in order."""
-    documents = _documents(space, told)
-    events = [(m.value.hardware_id, _event(m)) for m in told.of(space, 'flight_events')]
+def _configured(
+    space: str, messages: _Messages
+) -> Iterator[tuple[Message, Mapping[str, Any] | None]]:
+    """Yield each release with its configuration.
+
+    A configuration does not name the disc that it is of. It goes with the release that has the
+    same state and flight number, and of several with the one that was sent together with it.
+    """
     numbers = {
-        (child, e.stamp): e.values.get('flight') for child, e in events if e.name == 'thrown'
+        (message.value.hardware_id, event.stamp): event.values.get(EventKey.FLIGHT)
+        for message in messages.of(space, topics.FLIGHT_EVENTS)
+        if _is_throw(event := _event(message))
     }
-    for message in told.of(space, 'release'):
+    remaining = _documents(space, messages)
+    for message in messages.of(space, topics.RELEASE):
         value = message.value
         number = numbers.get((value.child_frame_id, _ns(value.header.stamp)))
         fitting = [
             (abs(at - message.log_time), i)
-            for i, (at, document) in enumerate(documents)
-            if number in {None, str(document.get('flight'))} and _is_of(document, _numbers(value))
+            for i, (at, document) in enumerate(remaining)
+            if number in {None, str(document.get(Key.FLIGHT))}
+            and _is_of(document, _numbers(value))
         ]
-        apart, mine = min(fitting, default=(_TOGETHER + 1, -1))
-        yield message, documents.pop(mine)[1] if apart <= _TOGETHER else None
+        apart, nearest = min(fitting, default=(_TOGETHER + 1, -1))
+        yield message, remaining.pop(nearest)[1] if apart <= _TOGETHER else None
 
 
-def _documents(space: str, told: _Told) -> list[tuple[int, Mapping[str, Any]]]:
+def _documents(space: str, messages: _Messages) -> list[tuple[int, Mapping[str, Any]]]:
     """Return the configurations in a namespace, each with its log time [ns]."""
     return [
         (message.log_time, document)
-        for message in told.of(space, 'configuration')
-        if (document := _document(message.value.data)) is not None
+        for message in messages.of(space, topics.CONFIGURATION)
+        if (document := document_of(message.value.data)) is not None
     ]
 
 
-_TOGETHER = 2 * NANOSECONDS  # of log time: a release and its configuration are sent together
-
-
-def _document(text: str) -> Mapping[str, Any] | None:
-    """Return the configuration of a flight, or None for a text that is something else."""
-    try:
-        document = yaml.load(text, Loader=_LOADER)  # noqa: S506 - one of the safe ones
-    except yaml.YAMLError:
-        return None
-    if not isinstance(document, dict) or not document.keys() >= set(_TOLD):
-        return None
-    release, wind = document.get('release'), document.get('wind')
-    if not _are_numbers(release, State._fields) or not _are_numbers(wind, 'xyz'):
-        return None
-    return document
-
-
-def _are_numbers(values: Any, names: Iterable[str]) -> bool:
-    return isinstance(values, dict) and all(
-        isinstance(values.get(name), int | float) for name in names
-    )
-
-
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-
-
 def _is_of(document: Mapping[str, Any], numbers: FloatArray) -> bool:
-    state = [float(document['release'][name]) for name in State._fields]
-    off = np.abs(odometry_array(state)[0][_RELEASED] - numbers[_RELEASED])
-    return bool((off <= _ROUNDING * (1.0 + np.abs(numbers[_RELEASED]))).all())
+    """Return True if a configuration has the state of a release message, to rounding."""
+    expected, recorded = odometry_array(release_of(document))[0][_RELEASED], numbers[_RELEASED]
+    return bool((np.abs(expected - recorded) <= _ROUNDING * (1.0 + np.abs(recorded))).all())
 
 
 def _numbers(odometry: Any) -> FloatArray:
@@ -367,15 +358,13 @@ def _numbers(odometry: Any) -> FloatArray:
     return np.array([getattr(v, n) for v, of in zip(vectors, names, strict=True) for n in of])
 
 
-def _stamp(thing: Change | Release) -> int:
-    return thing.stamp
+def _is_throw(event: Event) -> bool:
+    return event.name == FlightEvent.THROWN
+
+
+def _stamp(dated: Change | Release) -> int:
+    return dated.stamp
 
 
 def _ns(stamp: Any) -> int:
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
-
-
-def _seconds(text: str) -> int | None:
-    """Return an exact time in seconds as nanoseconds."""
-    match = re.fullmatch(r'(\d+)\.(\d{9})', text)
-    return int(match[1]) * NANOSECONDS + int(match[2]) if match else None

@@ -15,7 +15,7 @@ from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
 
 if TYPE_CHECKING:
-    from disc_sim_ros.analysis.bag_report import Analysis
+    from disc_sim_ros.analysis.bag_analysis import Analysis
     from disc_sim_ros.analysis.recording import Disc
     from disc_sim_ros.bags.reader import Bag
 
@@ -69,7 +69,7 @@ def _run(chosen: argparse.Namespace) -> int:
     if plot is not None:
         output.check_plot(plot)
     # Imported once the flags are known to be right: they take a second.
-    from disc_sim_ros.analysis import bag_report, flights, recording  # noqa: PLC0415
+    from disc_sim_ros.analysis import bag_analysis, flights, recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
 
     try:
@@ -84,7 +84,7 @@ def _run(chosen: argparse.Namespace) -> int:
         text = 'was not closed or is damaged; `repair_bag` makes a complete copy'
         output.note(chosen.prog, f'note: {chosen.bag} {text}')
     analysed = [
-        (disc, [bag_report.analyse(f, doubts) for f in flights.flights(disc)]) for disc in discs
+        (disc, [bag_analysis.analyse(f, doubts) for f in flights.flights(disc)]) for disc in discs
     ]
     every = [a for _, analyses in analysed for a in analyses]
     if plot is not None:
@@ -101,7 +101,7 @@ def _run(chosen: argparse.Namespace) -> int:
         if plot is not None:
             lines.append(f'wrote {plot}')
         output.show('\n'.join(lines))
-    return DIFFERENT if chosen.verify and not all(map(bag_report.passed, every)) else 0
+    return DIFFERENT if chosen.verify and not all(a.passed for a in every) else 0
 
 
 def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
@@ -120,7 +120,7 @@ def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
 
 def _doubts(bag: 'Bag') -> tuple[str, ...]:
     """Return the reasons why messages may be missing from the bag."""
-    from disc_sim_ros.analysis.bag_report import losses  # noqa: PLC0415
+    from disc_sim_ros.analysis.bag_analysis import losses  # noqa: PLC0415
 
     doubts = [f'{key}: {value}' for key, value in losses(bag.custom_data)]
     if not bag.complete:
@@ -131,10 +131,10 @@ def _doubts(bag: 'Bag') -> tuple[str, ...]:
 def _plot(name: str, bag: str, analyses: 'Sequence[Analysis]') -> None:
     if not analyses:
         raise DiscSimError(f'{bag}: there is no flight to plot')
-    from disc_sim_ros.analysis import bag_plots  # noqa: PLC0415 - matplotlib
+    from disc_sim_ros.analysis import bag_report, plots  # noqa: PLC0415 - matplotlib
 
-    title = bag_plots.title(analyses[0]) if len(analyses) == 1 else Path(bag).name
-    output.write_plot(name, bag_plots.bag_figure(analyses, title))
+    title = bag_report.title(analyses[0]) if len(analyses) == 1 else Path(bag).name
+    output.write_plot(name, plots.bag_figure(analyses, title))
 
 
 def _bag_document(bag: 'Bag') -> dict[str, Any]:
@@ -168,7 +168,7 @@ def _disc_document(
     for a in analyses:
         document = bag_report.document(a)
         if chosen.verify:
-            document['verification'] = bag_report.verification(a)
+            document['verification'] = bag_report.verification_document(a)
         flights.append(document)
     return {
         'disc': disc.name,
@@ -184,7 +184,7 @@ def _disc_document(
 
 
 def _bag_lines(bag: 'Bag') -> list[str]:
-    from disc_sim_ros.analysis.bag_report import losses  # noqa: PLC0415
+    from disc_sim_ros.analysis.bag_analysis import losses  # noqa: PLC0415
 
     seconds = _seconds(bag)
     filled = [info for info in bag.topics if info.message_count]
@@ -203,15 +203,15 @@ def _bag_lines(bag: 'Bag') -> list[str]:
 
 
 def _disc_lines(disc: 'Disc', analyses: 'Sequence[Analysis]', *, verify: bool) -> list[str]:
-    from disc_sim_ros.analysis import bag_text  # noqa: PLC0415
+    from disc_sim_ros.analysis import bag_report  # noqa: PLC0415
 
     lines = [f'{disc.name}: {disc.motion.topic}, {len(disc.motion)} messages']
     if not analyses:
         lines.append('  no flight: no throw was recorded, and the disc does not move')
     for a in analyses:
-        lines.append(bag_text.summary(a))
+        lines.append(bag_report.summary(a))
         if verify:
-            lines.append(bag_text.verification(a))
+            lines.append(bag_report.verification_text(a))
     return lines
 
 

@@ -209,23 +209,23 @@ class _Progress:
 
 def _report(bag: Path, plot: Path) -> int:
     """Analyse the bag, write the plot, print the summary; return the exit code."""
-    from disc_sim_ros.analysis import bag_plots, bag_report, bag_text, flights, plots, recording  # noqa: PLC0415
+    from disc_sim_ros.analysis import bag_analysis, bag_report, flights, plots, recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
 
     opened = open_bag(bag)
     disc = recording.discs(opened, '/odom')[0]
-    analyses = [bag_report.analyse(f) for f in flights.flights(disc)]
+    analyses = [bag_analysis.analyse(f) for f in flights.flights(disc)]
     if not analyses:
         raise DiscSimError(f'{bag}: the bag does not hold the throw')
-    title = bag_plots.title(analyses[0])
-    image = plots.image(bag_plots.bag_figure(analyses, title), 'png')
+    title = bag_report.title(analyses[0])
+    image = plots.image(plots.bag_figure(analyses, title), 'png')
     output.write_whole('--bag', str(plot), image)
     size = sum(file.stat().st_size for file in opened.files)
-    losses = bag_report.losses(opened.custom_data)
+    losses = bag_analysis.losses(opened.custom_data)
     filled = sum(info.message_count > 0 for info in opened.topics)
     lines = [
-        bag_text.summary(analyses[0]),
-        bag_text.verification(analyses[0]),
+        bag_report.summary(analyses[0]),
+        bag_report.verification_text(analyses[0]),
         f'recorded {opened.message_count} messages of {filled} topics, {size / 1e6:.1f} MB, '
         + (', '.join(f'{key}: {value}' for key, value in losses) or 'nothing lost'),
     ]
@@ -238,7 +238,7 @@ def _report(bag: Path, plot: Path) -> int:
         f'  Foxglove: open {opened.files[0]} with the layout {_layout()}',
     ]
     output.show('\n'.join(lines))
-    return 0 if all(map(bag_report.passed, analyses)) else DIFFERENT
+    return 0 if all(a.passed for a in analyses) else DIFFERENT
 
 
 def _program_folder() -> str:

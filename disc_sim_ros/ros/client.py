@@ -29,7 +29,7 @@ from disc_sim_ros.ros.processes import Process
 START = 90.0  # s for the simulator to compile the equations, find the recorder and be recorded
 SERVICE = 30.0  # s for the simulator to answer
 _NODE_NAME = 'demo'
-_NOT_OF_THE_SIMULATION = ('/rosout', '/parameter_events')
+_NOT_OF_THE_SIMULATION = (topics.NodeTopic.ROSOUT, topics.NodeTopic.PARAMETER_EVENTS)
 _WATCH_PERIOD = 0.1  # s
 
 
@@ -147,7 +147,7 @@ class Watcher:
         result = future.result()
         if result is None or not result.success:
             raise DiscSimError(f'the simulator did not throw: {result and result.message}')
-        self._wait(lambda: 'thrown' in self._events, SERVICE, 'the throw')
+        self._wait(lambda: topics.FlightEvent.THROWN in self._events, SERVICE, 'the throw')
 
     def watch(self, longest: float, show: Callable[[DiscSample], None]) -> str:
         """Watch the disc until it lands.
@@ -164,7 +164,7 @@ class Watcher:
         end = time.monotonic() + longest
         while time.monotonic() < end:
             self._spin(_WATCH_PERIOD)
-            for event in ('landed', 'failed'):
+            for event in (topics.FlightEvent.LANDED, topics.FlightEvent.FAILED):
                 if event in self._events:
                     return event
             m = self._newest_odometry()
@@ -212,7 +212,7 @@ class Watcher:
         time.sleep(max(end - time.monotonic(), 0.0))
 
     def _on_event(self, message: DiagnosticStatus) -> None:
-        self._events.append(message.name.rpartition(': ')[2])
+        self._events.append(topics.event_of(message.name))
 
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry = message

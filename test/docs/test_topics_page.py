@@ -10,10 +10,11 @@ import pytest
 pytest.importorskip('rclpy')
 
 from disc_sim_ros import topics
+from disc_sim_ros.physics.flight_config import EventKey, Landing
 from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT, LAUNCH, MEAN_WIND, POSITION
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim import publishers
-from disc_sim_ros.topics import Frames
+from disc_sim_ros.topics import FlightEvent, Frames
 
 ROOT = Path(__file__).parents[2]
 NODES = ROOT / 'disc_sim_ros/ros'
@@ -100,14 +101,16 @@ def test_the_page_has_every_service_and_no_other():
 
 
 def test_the_page_has_every_event_and_no_other():
-    assert set(named('Events')) == set(re.findall(r"Event\('([^']+)'", source('sim/events')))
+    published = re.findall(r'Event\(\s*FlightEvent\.(\w+)', source('sim/events'))
+    assert set(published) == set(FlightEvent.__members__)
+    assert sorted(named('Events')) == sorted(FlightEvent)
 
 
 def test_the_page_has_every_value_of_an_event():
     events = re.split('^### Events$', PAGE, flags=re.MULTILINE)[1].partition('\n## ')[0]
     stated = set(re.findall(r'`(\w+)`', events))
-    made = re.findall(r"'(\w+_(?:s|m|rad_s)|flight)':", source('sim/events'))
-    assert set(made) <= stated
+    keys = {value for name, value in vars(EventKey).items() if name.isupper()}
+    assert {*keys, *Landing._fields} <= stated
 
 
 def test_the_page_has_every_frame_and_no_other():

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 import math
 
 from disc_sim_ros.errors import IntegrationError
-from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.flight_config import NANOSECONDS, EventKey, exact_seconds, landing_of
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.simulator import FlightSimulator
-from disc_sim_ros.ros.sim.clock import NANOSECONDS
+from disc_sim_ros.topics import FlightEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Event:
     Attributes:
         name: Its name, behind that of the node.
         text: What happened, for people.
-        values: Values by key; `stamp_s` only where it is not the stamp of the present step.
+        values: Values by `EventKey`; a stamp only if it is not that of the present step.
         is_error: Whether the flight could not go on.
     """
 
@@ -27,8 +27,8 @@ class Event:
     is_error: bool = False
 
 
-RESET = Event('reset', 'the disc is back at its launch, at rest')
-COMMAND_EXPIRED = Event('command expired', 'a command was not renewed and fell to zero')
+RESET = Event(FlightEvent.RESET, 'the disc is back at its launch, at rest')
+COMMAND_EXPIRED = Event(FlightEvent.COMMAND_EXPIRED, 'a command was not renewed and fell to zero')
 
 
 def thrown(state: State, flight: int, source: str) -> Event:
@@ -41,12 +41,12 @@ def thrown(state: State, flight: int, source: str) -> Event:
     """
     speed = math.hypot(*state[3:6])
     values = {
-        'flight': flight,
-        'from': source,
-        'speed_m_s': speed,
-        'spin_rad_s': state.r,
+        EventKey.FLIGHT: flight,
+        EventKey.SOURCE: source,
+        EventKey.SPEED: speed,
+        EventKey.SPIN: state.r,
     }
-    return Event('thrown', f'{speed:.2f} m/s, spin {state.r:.2f} rad/s', values)
+    return Event(FlightEvent.THROWN, f'{speed:.2f} m/s, spin {state.r:.2f} rad/s', values)
 
 
 def landed(sim: FlightSimulator, flight: int, released: int) -> Event:
@@ -57,26 +57,16 @@ def landed(sim: FlightSimulator, flight: int, released: int) -> Event:
         flight: Number of the flight.
         released: Stamp of its release [ns].
     """
-    touch, release = sim.touch, sim.release
-    distance = math.hypot(touch.X - release.X, touch.Y - release.Y)
-    x, y, _ = frames.flip_yz((touch.X, touch.Y, touch.Z))
+    landing = landing_of(sim)
     values = {
-        'stamp_s': in_seconds(released + round(sim.touch_time * NANOSECONDS)),
-        'flight': flight,
-        'flight_time_s': sim.touch_time,
-        'range_m': distance,
-        'landing_x_m': x,
-        'landing_y_m': y,
-        'spin_rad_s': touch.r,
+        EventKey.STAMP: exact_seconds(released + round(landing.flight_time_s * NANOSECONDS)),
+        EventKey.FLIGHT: flight,
+        **landing._asdict(),
     }
-    return Event('landed', f'{distance:.2f} m in {sim.touch_time:.3f} s', values)
+    text = f'{landing.range_m:.2f} m in {landing.flight_time_s:.3f} s'
+    return Event(FlightEvent.LANDED, text, values)
 
 
 def failed(error: IntegrationError) -> Event:
     """Return the event of a flight that moves faster than its step can follow."""
-    return Event('failed', str(error), is_error=True)
-
-
-def in_seconds(nanoseconds: int) -> str:
-    """Return a time in seconds, exact: floats near the present date have steps of 240 ns."""
-    return f'{nanoseconds // NANOSECONDS}.{nanoseconds % NANOSECONDS:09d}'
+    return Event(FlightEvent.FAILED, str(error), is_error=True)

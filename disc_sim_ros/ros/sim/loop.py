@@ -8,11 +8,11 @@ import time
 from typing import Any
 
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics.flight_config import exact_seconds
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import SimConfig
-from disc_sim_ros.ros.sim.events import in_seconds
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.realtime import Pacer, configure_thread
 from disc_sim_ros.ros.sim.simulation import Counts, Simulation
@@ -91,7 +91,7 @@ class SimLoop(threading.Thread):
         if self.paused:
             self._simulation.publish()
         number = self._simulation.flight
-        return f'flight {number}, released at {in_seconds(self.clock.now)} s'
+        return f'flight {number}, released at {exact_seconds(self.clock.now)} s'
 
     def reset(self) -> str:
         """Put the disc at its launch, at rest; discard commands and count flights from 1 again."""
@@ -103,12 +103,12 @@ class SimLoop(threading.Thread):
     def pause(self) -> str:
         """Stop simulated time."""
         self.paused = True
-        return f'paused at {in_seconds(self.clock.now)} s'
+        return f'paused at {exact_seconds(self.clock.now)} s'
 
     def resume(self) -> str:
         """Let simulated time go on."""
         self.paused = False
-        return f'resumed at {in_seconds(self.clock.now)} s'
+        return f'resumed at {exact_seconds(self.clock.now)} s'
 
     def step(self) -> str:
         """Advance to the next message while paused.
@@ -120,7 +120,7 @@ class SimLoop(threading.Thread):
             raise ConfigError('~/step', 'a running simulation', 'pause it first by ~/pause')
         self._simulation.poll()
         self._advance(self._simulation.config.steps_per_publish, serve=False)
-        return f'stepped to {in_seconds(self.clock.now)} s'
+        return f'stepped to {exact_seconds(self.clock.now)} s'
 
     def configure(self, config: SimConfig) -> str:
         """Take changed parameters: wind and pace at once, the rest at the next throw."""

@@ -206,7 +206,7 @@ class Publishers:
         self.events.publish(
             DiagnosticStatus(
                 level=DiagnosticStatus.ERROR if is_error else DiagnosticStatus.OK,
-                name=f'{self._node_name}: {name}',
+                name=topics.event_title(self._node_name, name),
                 message=text,
                 hardware_id=self.frames.disc,
                 values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],

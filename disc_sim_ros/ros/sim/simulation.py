@@ -8,7 +8,12 @@ from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError, IntegrationError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.environment import Wind
-from disc_sim_ros.physics.flight_config import configuration_text
+from disc_sim_ros.physics.flight_config import (
+    EventKey,
+    FlightConfig,
+    configuration_text,
+    exact_seconds,
+)
 from disc_sim_ros.physics.kernels.equations import DISC_AIR, State, Velocity
 from disc_sim_ros.physics.simulator import NOTHING, FlightSimulator
 from disc_sim_ros.ros import messages
@@ -179,15 +184,16 @@ class Simulation:
         self._released = self.clock.now
         self._throw_at = self._after_period()
         self.publishers.clear_path()
-        text = configuration_text(
-            setup,
-            sim.release,
-            self.flight,
+        recorded = FlightConfig(
+            setup=setup,
+            release=sim.release,
+            flight=self.flight,
             physics_rate=config.physics_rate,
             publish_rate=config.publish_rate,
             ground=config.ground,
             command_timeout=config.command_timeout,
         )
+        text = configuration_text(recorded)
         self.publishers.publish_release(self._released, sim.state, text, setup.disc.diameter)
         self.publish_wind()
         self._publish_active_control()
@@ -348,7 +354,7 @@ class Simulation:
 
     def _publish_event(self, event: Event) -> None:
         """Publish an event, stamped with the present time unless it has a stamp of its own."""
-        values = {'stamp_s': events.in_seconds(self.clock.now)} | event.values
+        values = {EventKey.STAMP: exact_seconds(self.clock.now)} | event.values
         self.publishers.publish_event(event.name, event.text, values, is_error=event.is_error)
 
 

@@ -1,0 +1,172 @@
+"""The analysis of one recorded flight: its trajectory, launch, landing, wind and verification."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+import math
+import re
+
+import numpy as np
+
+from disc_sim_ros import topics
+from disc_sim_ros.analysis.checks import (
+    Check,
+    Stamps,
+    checks,
+    ground_crossing,
+    stamps_of,
+    with_twist,
+)
+from disc_sim_ros.analysis.recording import Flight
+from disc_sim_ros.analysis.resimulate import Reflight, Verdict, compare, fly_again
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.flight_config import Key, landing_from
+from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.physics.trajectory import Trajectory
+
+_LOSSES = re.compile(r'drop|lost|loss|gap|missed', re.IGNORECASE)
+
+
+class WindSource(StrEnum):
+    """Where the wind in a recorded trajectory is from."""
+
+    GUSTS = 'with gusts'  # of an exact re-flight
+    MEAN = 'mean wind, without gusts'  # as recorded
+    UNKNOWN = 'wind unknown, taken as 0'
+
+
+@dataclass(frozen=True)
+class Touchdown:
+    """A landing: time since the release [s], place in `map` [m], and spin [rad/s] if known."""
+
+    time: float
+    x: float
+    y: float
+    spin: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """What is known of one recorded flight.
+
+    Attributes:
+        flight: What was recorded.
+        again: Its re-flight; None if it cannot be flown again.
+        verdict: The difference of the two.
+        why_not: Why there is no re-flight, or ''.
+        trajectory: The recorded motion up to the landing.
+        wind: Where the wind in it is from.
+        release: The exact state at release if it was recorded, else that of the first message.
+        landing: The landing; None if there was none.
+        stamps: How its messages follow each other.
+        checks: Checks that need no model of the body.
+    """
+
+    flight: Flight
+    again: Reflight | None
+    verdict: Verdict | None
+    why_not: str
+    trajectory: Trajectory
+    wind: WindSource
+    release: State
+    landing: Touchdown | None
+    stamps: Stamps
+    checks: tuple[Check, ...]
+
+    @property
+    def wind_is_known(self) -> bool:
+        """Return True if the trajectory has the wind of the flight, gusts or mean."""
+        return self.wind is not WindSource.UNKNOWN
+
+    @property
+    def passed(self) -> bool:
+        """Return True if all that can be verified is as it should be."""
+        if self.verdict is not None:
+            return self.verdict.exact
+        return all(check.passed for check in self.checks)
+
+
+def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
+    """Analyse a recorded flight.
+
+    Args:
+        flight: What was recorded.
+        bag_doubts: What the bag as a whole may lack.
+    """
+    again, verdict, why_not = None, None, ''
+    try:
+        again = fly_again(flight)
+        verdict = compare(flight, again, bag_doubts)
+    except DiscSimError as error:
+        why_not = str(error)
+    exact = again if verdict is not None and verdict.exact else None
+    states = frames.states_from_odometry(with_twist(flight.motion).numbers)
+    if exact is not None:
+        winds = exact.winds
+        wind = WindSource.GUSTS if exact.config.setup.wind.turbulence else WindSource.MEAN
+    else:
+        winds, wind = _mean_wind(flight, again)
+    landing = _landing(flight, exact)
+    flown = flight.time < (math.inf if landing is None else landing.time)
+    flown[0] = True
+    rows = np.column_stack([flight.time, states, winds])[flown]
+    diameter = math.nan if again is None else again.config.setup.disc.diameter
+    return Analysis(
+        flight=flight,
+        again=again,
+        verdict=verdict,
+        why_not=why_not,
+        trajectory=Trajectory(rows, diameter),
+        wind=wind,
+        release=State(*states[0].tolist()) if again is None else again.config.release,
+        landing=landing,
+        stamps=stamps_of(flight.motion),
+        checks=tuple(checks(flight.motion)),
+    )
+
+
+def _mean_wind(flight: Flight, again: Reflight | None) -> tuple[FloatArray, WindSource]:
+    """Return the mean wind at each message, earth axes 1 [m/s], and where it is from."""
+    changes = [c for c in flight.disc.changes if c.topic == topics.APPLIED_WIND]
+    stamps = flight.motion.stamps
+    winds = np.zeros((len(stamps), 3))
+    if again is not None:
+        winds[:] = again.config.setup.wind.mean
+    for change in changes:
+        winds[stamps >= change.stamp] = frames.flip_yz(change.values)
+    known = changes or again is not None
+    return winds, WindSource.MEAN if known else WindSource.UNKNOWN
+
+
+def _landing(flight: Flight, exact: Reflight | None) -> Touchdown | None:
+    """Return the landing: as recorded, else of an exact re-flight, else where z = 0 is crossed."""
+    landing = None if flight.landing is None else landing_from(flight.landing.values)
+    if landing is None and exact is not None and exact.landing is not None:
+        landing = exact.landing if exact.landing.flight_time_s <= flight.time[-1] else None
+    if landing is not None:
+        return Touchdown(
+            landing.flight_time_s, landing.landing_x_m, landing.landing_y_m, landing.spin_rad_s
+        )
+    configuration = flight.configuration
+    has_ground = configuration is None or configuration.get(Key.GROUND)
+    crossing = ground_crossing(flight.motion) if has_ground else None
+    if crossing is None:
+        return None
+    time, place = crossing
+    time += flight.starts_late
+    spin = None
+    if flight.motion.has_twist:
+        before = max(int(np.searchsorted(flight.time, time)) - 1, 0)
+        spin = frames.flip(float(flight.motion.numbers[before, 12]))
+    return Touchdown(time, float(place[0]), float(place[1]), spin)
+
+
+def losses(custom_data: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return what a recorder noted of losses in the `custom_data` of a bag."""
+    return [
+        (key, value)
+        for key, value in custom_data.items()
+        if _LOSSES.search(key) and value.strip() not in {'', '0', '{}', '[]'}
+    ]
