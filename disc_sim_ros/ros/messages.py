@@ -17,6 +17,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames as paper_frames
 from disc_sim_ros.physics import imu as ideal_imu
 from disc_sim_ros.physics import trajectory
+from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.kernels.rotation import Quaternion
@@ -61,8 +62,7 @@ _POSITION = (POSITION, POSITION, POSITION)
 _SPEED = LAUNCH['speed']
 _VELOCITY = (VELOCITY, VELOCITY, VELOCITY)
 _RATES = (LAUNCH['roll_rate'], LAUNCH['pitch_rate'], LAUNCH['spin'])
-_UNIT_NORM = 1e-3  # a quaternion this near to unit length is meant to have it
-_NANOSECONDS = 1_000_000_000
+_UNIT_NORM = 1e-3  # largest deviation of a quaternion from length 1
 
 # The numbers in the order of the fields.
 pose = paper_frames.pose  # POSE_FIELDS and TRANSFORM_FIELDS
@@ -78,7 +78,7 @@ Six = ideal_imu.Reading
 
 def stamp(nanoseconds: int) -> tuple[int, int]:
     """Return a time in nanoseconds as the seconds and nanoseconds of a message."""
-    return divmod(nanoseconds, _NANOSECONDS)
+    return divmod(nanoseconds, NANOSECONDS)
 
 
 def moment_from_wrench(message: Any, frames: Frames) -> tuple[float, float, float, int]:
@@ -86,7 +86,7 @@ def moment_from_wrench(message: Any, frames: Frames) -> tuple[float, float, floa
 
     Args:
         message: geometry_msgs/WrenchStamped in `disc`, `disc_body` or `disc_air`; an empty frame
-            is `disc_air`. Nothing else than a torque may be set.
+            is `disc_air`. Its force must be 0.
         frames: Names of the frames.
 
     Raises:
@@ -104,11 +104,11 @@ def moment_from_wrench(message: Any, frames: Frames) -> tuple[float, float, floa
 
 
 def coefficients_from_vector(message: Any, frames: Frames) -> Vector:
-    """Return C_L, C_M, C_N, from x, y, z of a command that has the paper's signs already.
+    """Return C_L, C_M, C_N, from x, y, z of a command, which has the paper's signs.
 
     Args:
-        message: geometry_msgs/Vector3Stamped. Coefficients always act about the axes of the flow;
-            its frame is empty or `disc_air`, because any other would promise something else.
+        message: geometry_msgs/Vector3Stamped. Coefficients always act about the axes of the flow:
+            its frame is empty or `disc_air`.
         frames: Names of the frames.
 
     Raises:
@@ -119,7 +119,7 @@ def coefficients_from_vector(message: Any, frames: Frames) -> Vector:
 
 
 def wind_from_vector(message: Any, frames: Frames) -> Vector:
-    """Return where the air moves to, in earth axes 1 [m/s].
+    """Return the velocity of the air in earth axes 1 [m/s].
 
     Args:
         message: geometry_msgs/Vector3Stamped in `map`; an empty frame is `map`.
@@ -135,11 +135,11 @@ def wind_from_vector(message: Any, frames: Frames) -> Vector:
 def release_from_odometry(message: Any, frames: Frames) -> State:
     """Return the state at release, spin angle 0, from another node's throw.
 
-    Whether the release is above the ground is left to who has a ground.
+    The caller checks that the release is not below the ground.
 
     Args:
-        message: nav_msgs/Odometry of `disc` in `map`, its twist in `disc`, over the ground; empty
-            frames are these. Covariances have no effect.
+        message: nav_msgs/Odometry of `disc` in `map`, its twist in `disc`, over the ground.
+            Empty frames mean these. Covariances have no effect.
         frames: Names of the frames.
 
     Raises:
@@ -191,7 +191,7 @@ def _vector(thing: str, vector: Any, quantities: tuple[Quantity, ...]) -> Vector
 
 
 def _frame(topic: str, message: Any, allowed: Any, default: str) -> str:
-    """Return the frame of a message, or the default where it names none."""
+    """Return the frame of a message, or the default if it is empty."""
     frame: str = message.header.frame_id or default
     if frame not in allowed:
         advice = f'give {", ".join(allowed)}, or leave it empty for {default}'
