@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from disc_sim_ros.physics.kernels import equations
 from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
-from disc_sim_ros.physics.kernels.jit import entry, inline, jit
+from disc_sim_ros.physics.kernels.jit import entry, jit
 from disc_sim_ros.physics.kernels.rk4 import axpy
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
@@ -22,13 +22,10 @@ if TYPE_CHECKING:
 DESPUN, SPINNING, PRINTED = range(3)
 STILL = Velocity(0.0, 0.0, 0.0)
 NO_CONTROL = Control()
-_rotation = inline(rotation_elements)
 
 
 @jit
-def derivative(
-    s: State, axes: int, plant: Plant, table: 'FloatArray', spin_terms: 'FloatArray'
-) -> State:
+def derivative(s: State, axes: int, plant: Plant) -> State:
     """Return the rate of change of a state.
 
     Args:
@@ -36,12 +33,10 @@ def derivative(
             and sigma is 0; in PRINTED its VX, VY, VZ are the components u, v, w in these axes.
         axes: DESPUN, SPINNING or PRINTED.
         plant: Constants of the flight.
-        table: As of `equations.derivative`.
-        spin_terms: As of `equations.derivative`.
     """
     if axes == DESPUN:
-        return equations.derivative(s, STILL, plant, table, spin_terms, NO_CONTROL)
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = _rotation(s.e0, s.e1, s.e2, s.e3)
+        return equations.derivative(s, STILL, plant, NO_CONTROL)
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation_elements(s.e0, s.e1, s.e2, s.e3)
     X_dot, Y_dot, Z_dot = s.VX, s.VY, s.VZ
     if axes == PRINTED:
         u, v, w = s.VX, s.VY, s.VZ
@@ -51,7 +46,7 @@ def derivative(
     p, q, r = s.p, s.q, s.r
     at = State(s.X, s.Y, s.Z, X_dot, Y_dot, Z_dot, s.e0, s.e1, s.e2, s.e3, p, q, r, 0.0)
     a = equations.flow(at, STILL)
-    C = equations.coefficients(a, r, plant, table, spin_terms)
+    C = equations.coefficients(a, r, plant)
     X, Y, Z = equations.force(a, C, plant)
     m = equations.moment(a, at, C, plant, NO_CONTROL)
 
@@ -92,17 +87,15 @@ def flown(
     step: float,
     duration: float,
     plant: Plant,
-    table: 'FloatArray',
-    spin_terms: 'FloatArray',
 ) -> State:
     """Return the state after `duration` in steps of `step`, the last one shorter [s]."""
     n = math.ceil(duration / step * (1.0 - 1e-12))
     for i in range(n):
         h = step if i < n - 1 else duration - i * step
-        k1 = derivative(s, axes, plant, table, spin_terms)
-        k2 = derivative(axpy(s, 0.5 * h, k1), axes, plant, table, spin_terms)
-        k3 = derivative(axpy(s, 0.5 * h, k2), axes, plant, table, spin_terms)
-        k4 = derivative(axpy(s, h, k3), axes, plant, table, spin_terms)
+        k1 = derivative(s, axes, plant)
+        k2 = derivative(axpy(s, 0.5 * h, k1), axes, plant)
+        k3 = derivative(axpy(s, 0.5 * h, k2), axes, plant)
+        k4 = derivative(axpy(s, h, k3), axes, plant)
         s = axpy(s, h / 6.0, axpy(axpy(axpy(k1, 2.0, k2), 2.0, k3), 1.0, k4))
         n_e = 1.0 / math.sqrt(s.e0 * s.e0 + s.e1 * s.e1 + s.e2 * s.e2 + s.e3 * s.e3)
         s = State(s.X, s.Y, s.Z, s.VX, s.VY, s.VZ, s.e0 * n_e, s.e1 * n_e, s.e2 * n_e, s.e3 * n_e,
@@ -111,13 +104,11 @@ def flown(
 
 
 @entry
-def rates(
-    y: 'FloatArray', axes: int, plant: Plant, table: 'FloatArray', spin_terms: 'FloatArray'
-) -> State:
+def rates(y: 'FloatArray', axes: int, plant: Plant) -> State:
     """Return `derivative` of a state that comes as an array, shape (14,), for scipy."""
     s = State(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12],
               y[13])  # fmt: skip
-    return derivative(s, axes, plant, table, spin_terms)
+    return derivative(s, axes, plant)
 
 
 def released(state: State, axes: int) -> State:

@@ -116,10 +116,8 @@ def off(throw: Throw, axes: int, step: float, setup: Setup) -> float:
             replace(setup, step=step).check_step(throw.launch.spin, throw.launch.speed)
         except ConfigError:
             return math.inf
-    disc = setup.disc
     state = released(throw.launch.state(), axes)
-    parts = (setup.plant, disc.table_rows, disc.spin_terms)
-    end = flown(state, axes, step, throw.time, *parts)
+    end = flown(state, axes, step, throw.time, setup.plant)
     error = math.dist(end[:3], throw.landing)
     return error if error < math.inf else math.inf  # no nan
 
@@ -130,15 +128,13 @@ def check(throw: Throw, setup: Setup) -> None:
     Raises:
         SystemExit: More than can be; what is measured here would mean nothing.
     """
-    disc = setup.disc
-    parts = (setup.plant, disc.table_rows, disc.spin_terms)
     state = throw.launch.state()
     by_core = fly(throw.launch, setup, duration=throw.time, ground=False).end
-    same = math.dist(by_core[:3], flown(state, DESPUN, setup.step, throw.time, *parts)[:3])
+    same = math.dist(by_core[:3], flown(state, DESPUN, setup.step, throw.time, setup.plant)[:3])
     found = {'despun loop from flight.fly': (same, 1e-12)}
     for axes in (SPINNING, PRINTED):
         solution = solve_ivp(
-            lambda _, y, axes=axes: rates(y, axes, *parts),
+            lambda _, y, axes=axes: rates(y, axes, setup.plant),
             (0.0, throw.time),
             released(state, axes),
             method='DOP853',
@@ -162,8 +158,8 @@ def point(throw: Throw, axes: int, step: float, setup: Setup) -> Point:
 
 def cpu(throw: Throw, axes: int, step: float, setup: Setup) -> float:
     """Return the CPU seconds of one flight, in the best of a few rounds."""
-    disc, state = setup.disc, released(throw.launch.state(), axes)
-    arguments = (state, axes, step, throw.time, setup.plant, disc.table_rows, disc.spin_terms)
+    state = released(throw.launch.state(), axes)
+    arguments = (state, axes, step, throw.time, setup.plant)
     best, count = math.inf, 1
     for _ in range(ROUNDS + 1):
         start = time.process_time()

@@ -163,8 +163,8 @@ def _record(
         domain = stack.enter_context(processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='demo_')))
         progress.line(f'starting sim_node and recorder_node in ROS domain {domain}')
-        if not flight.is_ready():
-            progress.line('compiling the equations of motion, once on this machine, about 10 s')
+        if text := flight.first_call_note():
+            progress.line(text)
         with signals.held():
             sim = stack.enter_context(processes.started('sim_node', parameters, folder))
             to = {'bag': str(bag.absolute()), 'start_paused': True}

@@ -119,8 +119,7 @@ def _fly(
     if chosen.model == 'precession' and (release.roll_rate or release.pitch_rate):
         text = 'the precession model computes both rates itself'
         output.note(chosen.prog, f'note: --roll-rate and --pitch-rate have no effect: {text}')
-    if not flight.is_ready():
-        text = 'compiling the equations of motion, once on this machine, about 10 s'
+    if text := flight.first_call_note():
         output.note(chosen.prog, f'note: {text}')
     with output.ended_by_ctrl_c():
         return flight.fly(

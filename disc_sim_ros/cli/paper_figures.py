@@ -87,8 +87,7 @@ def _write_all(chosen: argparse.Namespace, folder: Path) -> None:
     # Imported once the arguments are known to be right: matplotlib and scipy take a second.
     from disc_sim_ros.paper import run  # noqa: PLC0415
 
-    if not flight.is_ready():
-        text = 'compiling the equations of motion, once on this machine, about 10 s'
+    if text := flight.first_call_note():
         output.note(chosen.prog, f'note: {text}')
         with output.ended_by_ctrl_c():
             _compile()

@@ -245,7 +245,6 @@ def _numbers(flag: str, text: str, value: str, count: int, form: str) -> tuple[f
 
 
 def note_compilation(prog: str, setup: flight.Setup) -> None:
-    """Say that the first run on a machine takes longer."""
-    if not ensemble.is_ready(setup):
-        text = 'compiling the equations of motion, once on this machine, about 15 s'
+    """Print why the first flights take longer, if they do."""
+    if text := ensemble.first_call_note(setup):
         sys.stderr.write(f'{prog}: note: {text}\n')

@@ -1,8 +1,8 @@
-"""Many flights at once: those of `flight.fly`, side by side in vector registers, on all cores."""
+"""Many flights at once, equal to those of `flight.fly`: in SIMD registers, on all cores."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 import os
 from typing import Any
@@ -15,18 +15,18 @@ from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight, frames
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.kernels.batch import fly_lanes
-from disc_sim_ros.physics.kernels.batch_rows import AT, NAMES, fly_rows
+from disc_sim_ros.physics.kernels.batch import Ends, Workspace, fly_rows, fly_simd, workspace
 from disc_sim_ros.physics.kernels.equations import Control, State
-from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, STATE_SIZE
-from disc_sim_ros.physics.kernels.jit import COMPILED, is_compiled
-from disc_sim_ros.physics.kernels.rk4 import STABLE
+from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, STATE_SIZE, Options
+from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
+from disc_sim_ros.physics.kernels.rk4 import STABLE, Inputs
+from disc_sim_ros.physics.kernels.rows import AT, NAMES
 from disc_sim_ros.physics.kernels.simd import WIDTH
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS
 from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import DURATION, LAUNCH, VARIED
 
-# Flights that a thread takes at a time: for 0.1 s or so, so that Ctrl-C is heard.
+# A thread takes as many flights at a time as it flies in about 0.1 s, so that Ctrl-C acts soon.
 _CHUNK = 2e6  # steps
 _USUAL_FLIGHT = 10.0  # s; most are shorter
 _LONGEST_CHUNK = 4096  # flights
@@ -35,14 +35,14 @@ _FIRST_GUSTS = 500  # rows of noise drawn at first, for 5 s; most flights have l
 
 @dataclass(frozen=True, slots=True)
 class Landings:
-    """How the flights of an ensemble ended; positions in `map`.
+    """The ends of the flights of an ensemble; positions in `map`.
 
     Attributes:
         status: LANDED, FLYING (time was up) or LOST (the step could not follow: the state is the
             last sound one), shape (n,).
         time: Time of flight [s], shape (n,).
         apex: Greatest height above the ground [m], shape (n,).
-        drift: How far left of its launch heading each ended [m], shape (n,).
+        drift: Distance of each end to the left of its launch heading [m], shape (n,).
         states: States at the end in the paper's axes, columns as in State, shape (n, 14).
     """
 
@@ -54,17 +54,17 @@ class Landings:
 
     @property
     def x(self) -> FloatArray:
-        """Return how far forward each ended [m]."""
+        """Return x of each end, forward [m]."""
         return self.states[:, 0]
 
     @property
     def y(self) -> FloatArray:
-        """Return how far left each ended [m]."""
+        """Return y of each end, left [m]."""
         return frames.flip(self.states[:, 1])
 
     @property
     def z(self) -> FloatArray:
-        """Return how high each ended [m]; 0 where it landed."""
+        """Return z of each end, up [m]; 0 where it landed."""
         return np.where(self.status == LANDED, 0.0, frames.flip(self.states[:, 2]))
 
     @property
@@ -97,53 +97,53 @@ def fly_many(
     """Fly many discs, each as `flight.fly` would.
 
     Args:
-        launches: What differs by name, as in NAMES: fields of Launch, components of the mean wind
-            in `map`, control coefficients, properties of the disc and of the air. Each is a
-            number or an array of shape (n,); what is not named is that of a default Launch, of
-            `setup` and of `control`.
+        launches: Quantities that differ between flights, by a name of NAMES: fields of Launch,
+            components of the mean wind in `map`, control coefficients, properties of the disc and
+            of the air. Each is a number or an array of shape (n,). Others are those of a default
+            Launch, of `setup` and of `control`.
         setup: The disc, the model, the air, the wind and the step of all.
         control: Control inputs of all, held for the whole flight.
-        seeds: Seeds of the gusts, shape (n,); all fly in those of `setup` otherwise.
+        seeds: Seeds of the gusts, shape (n,); None for that of `setup` in every flight.
         duration: Longest time of flight [s].
         ground: End where the centre crosses z = 0 from above; else fly for `duration`.
-        threads: Number of threads; None for one a core.
+        threads: Number of threads; None for one per core.
 
     Returns:
         The ends of the flights, in their order; they do not depend on `threads`.
 
     Raises:
-        ConfigError: A name is unknown, shapes differ, a value is out of range or a step too long
-            for a flight; it names the first such flight.
+        ConfigError: A name is unknown, shapes differ, a value is out of range or the step is too
+            long for a flight; it names the first such flight.
     """
     DURATION.check(duration)
     control = flight.checked_control(control)
     columns = _checked_columns(launches, setup, control, ground=ground)
     n = max((x.size for x in columns.values() if x.ndim), default=1)
-    found = Landings(
+    ends = Ends(
         np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty((n, STATE_SIZE))
     )
-    gusts = None
+    gust_seeds = None
     seconds = min(duration, _USUAL_FLIGHT) if ground else duration
     chunk = round(min(max(_CHUNK * setup.step / seconds, WIDTH), _LONGEST_CHUNK))
     if setup.wind.turbulence > 0.0:
-        gusts = _seeds(setup.wind.seed if seeds is None else seeds, n)
+        gust_seeds = _seeds(setup.wind.seed if seeds is None else seeds, n)
         chunk = max(chunk // 16, 1)
-    fixed = _Fixed(setup, control, float(duration), ground, found)
+    common = _Common(setup, control, float(duration), ground, ends)
 
     def work(start: int) -> None:
-        rows = _rows(columns, start, min(start + chunk, n))
-        if gusts is None:
-            fixed.fly(rows, start, flight.NO_NOISE)
+        rows, space = _rows(columns, start, min(start + chunk, n)), workspace(setup.plant)
+        if gust_seeds is None:
+            common.fly(rows, start, flight.NO_NOISE, common.duration, space)
             return
         for i, row in enumerate(rows, start):
-            fixed.fly_in_gusts(row[np.newaxis], i, int(gusts[i]))
+            common.fly_in_gusts(row[np.newaxis], i, int(gust_seeds[i]), space)
 
     starts = range(0, n, chunk)
     workers = min(threads or os.cpu_count() or 1, len(starts))
     if workers <= 1:
         for start in starts:
             work(start)
-        return found
+        return Landings(*ends)
     pool = ThreadPoolExecutor(workers)
     try:
         futures: list[Future[None]] = [pool.submit(work, start) for start in starts]
@@ -151,67 +151,60 @@ def fly_many(
             future.result()
     finally:
         pool.shutdown(cancel_futures=True)
-    return found
+    return Landings(*ends)
 
 
-def is_ready(setup: Setup) -> bool:
-    """Say whether `fly_many` needs no compilation first: gusts have a kernel of their own."""
-    return is_compiled(_kernel(gusts=setup.wind.turbulence > 0.0))
+def first_call_note(setup: Setup) -> str:
+    """Return one line for users on why the next `fly_many` takes long; '' if it does not."""
+    return note_before(_kernel(gusts=setup.wind.turbulence > 0.0), seconds=15)
 
 
 def _kernel(*, gusts: bool) -> Callable[..., None]:
-    """Return what flies: side by side, but one by one in gusts and in plain Python."""
-    return fly_lanes if COMPILED and not gusts else fly_rows
+    """Return the loop over flights: in SIMD registers, but singly in gusts and in plain Python."""
+    return fly_simd if COMPILED and not gusts else fly_rows
 
 
 @dataclass(frozen=True)
-class _Fixed:
-    """What all flights of an ensemble share."""
+class _Common:
+    """The values that all flights of an ensemble share, and the arrays of their ends."""
 
     setup: Setup
     control: Control
     duration: float
     ground: bool
-    found: Landings
+    ends: Ends
 
-    def fly(self, rows: FloatArray, start: int, noise: FloatArray) -> None:
-        """Fly all rows, the first of which is flight `start`: side by side if without gusts."""
-        setup, found = self.setup, self.found
-        _kernel(gusts=len(noise) > 0)(
-            rows,
-            start,
-            setup.plant,
-            setup.disc.table_rows,
-            setup.disc.spin_terms,
-            self.control,
-            setup.wind_data,
-            noise,
-            float(setup.step),
-            self.duration,
-            self.ground,
-            found.status,
-            found.time,
-            found.apex,
-            found.drift,
-            found.states,
-        )
+    def fly(
+        self,
+        rows: FloatArray,
+        start: int,
+        noise: FloatArray,
+        duration: float,
+        space: Workspace,
+    ) -> None:
+        """Fly all rows, the first of which is flight `start`."""
+        setup = self.setup
+        inputs = Inputs(self.control, setup.wind_data, noise)
+        options = Options(float(setup.step), duration, self.ground, 0.0)
+        fly = _kernel(gusts=len(noise) > 0)
+        fly(rows, start, setup.plant, inputs, options, self.ends, space)
 
-    def fly_in_gusts(self, row: FloatArray, i: int, seed: int) -> None:
-        """Fly one; draw more of the same numbers where it is in the air for long."""
+    def fly_in_gusts(self, row: FloatArray, i: int, seed: int, space: Workspace) -> None:
+        """Fly one row; draw more of the same numbers if it is in the air for long."""
         needed = math.ceil(self.duration / GUST_INTERVAL) + 3
         for count in (min(_FIRST_GUSTS, needed), min(4 * _FIRST_GUSTS, needed), needed):
             generator = np.random.Generator(np.random.Philox(seed))
             noise = generator.standard_normal((count, NOISE_COLUMNS))
             duration = min(self.duration, (count - 3) * GUST_INTERVAL)
-            replace(self, duration=duration).fly(row, i, noise)
-            if self.found.status[i] != FLYING or count == needed:
+            self.fly(row, i, noise, duration, space)
+            if self.ends.status[i] != FLYING or count == needed:
                 return
 
 
 def _checked_columns(
     launches: Mapping[str, ArrayLike], setup: Setup, control: Control, *, ground: bool
 ) -> dict[str, FloatArray]:
-    """Return all of NAMES, checked: what is given, of shape (n,) or (), and what is not."""
+    """Return a checked column for each of NAMES, of shape (n,) or ()."""
     columns = {name: np.array(x) for name, x in _defaults(setup, control).items()}
     for name, values in launches.items():
         validation.choice('launches', name, NAMES)
@@ -237,7 +230,7 @@ def _checked_columns(
 
 
 def _rows(columns: dict[str, FloatArray], start: int, stop: int) -> FloatArray:
-    """Return the columns of some flights as the compiled loop takes them, (n, len(NAMES))."""
+    """Return some flights as rows for the compiled loops, shape (stop - start, len(NAMES))."""
     rows = np.empty((stop - start, len(NAMES)))
     for j, name in enumerate(NAMES):
         x = columns[name]
@@ -280,7 +273,7 @@ def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
 
 
 def _defaults(setup: Setup, control: Control) -> dict[str, float]:
-    """Return what each of NAMES is where it is not given."""
+    """Return the default of each of NAMES."""
     wind = (frames.map_from_paper(setup.wind.mean) + 0.0).tolist()
     plant = setup.plant
     other = [*wind, control.C_L, control.C_M, control.C_N]
@@ -291,7 +284,8 @@ def _defaults(setup: Setup, control: Control) -> dict[str, float]:
 
 
 def _seeds(seeds: ArrayLike, n: int) -> IntArray:
-    found = np.asarray(seeds)
-    if found.dtype.kind not in 'iu' or found.shape not in {(), (n,)} or (found < 0).any():
+    """Return a checked seed for each of `n` flights."""
+    array = np.asarray(seeds)
+    if array.dtype.kind not in 'iu' or array.shape not in {(), (n,)} or (array < 0).any():
         raise ConfigError('seeds', seeds, f'give whole numbers from 0, one or {n} of them')
-    return np.broadcast_to(found.astype(np.int64), (n,))
+    return np.broadcast_to(array.astype(np.int64), (n,))

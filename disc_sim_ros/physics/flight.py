@@ -1,4 +1,4 @@
-"""One flight from release to landing, without ROS: the function that everything offline uses."""
+"""One flight from release to landing, without ROS: `fly`, which every offline tool uses."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,8 +25,9 @@ from disc_sim_ros.physics.kernels.equations import (
     Plant,
     State,
 )
-from disc_sim_ros.physics.kernels.jit import is_compiled
-from disc_sim_ros.physics.kernels.rk4 import STABLE
+from disc_sim_ros.physics.kernels.integrator import Options
+from disc_sim_ros.physics.kernels.jit import note_before
+from disc_sim_ros.physics.kernels.rk4 import STABLE, Inputs
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, WindData
 from disc_sim_ros.physics.launch import Launch, require_above_ground
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
@@ -40,7 +41,7 @@ MOST_SAMPLES = 5_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """What flies, in what and how it is computed.
+    """The disc, its surroundings, and how a flight is computed.
 
     Attributes:
         disc: The disc.
@@ -52,7 +53,7 @@ class Setup:
         step: Integration step [s].
 
     Raises:
-        ConfigError: An unknown word, or aerodynamics that the disc does not hold.
+        ConfigError: A name is unknown, or the disc has no aerodynamics of this kind.
     """
 
     disc: Disc
@@ -70,12 +71,12 @@ class Setup:
         if self.aero is not None:
             validation.choice('aero', self.aero, AERODYNAMICS)
             if not self.disc.has(self.aero):
-                allowed = f'disc {self.disc.name} holds no such coefficients'
+                allowed = f'disc {self.disc.name} has no such coefficients'
                 raise ConfigError('aero', self.aero, allowed)
 
     @cached_property
     def plant(self) -> Plant:
-        """Return the constants as the compiled equations take them."""
+        """Return the constants in the form of the compiled equations."""
         disc = self.disc
         return Plant(
             m=float(disc.mass),
@@ -92,19 +93,21 @@ class Setup:
             moment_axes=MOMENT_AXES[self.moment_axes],
             use_linear=(self.aero or disc.aero) == 'linear',
             line=_line(disc),
+            table=disc.table_rows,
+            spin_terms=disc.spin_terms,
         )
 
     def check_step(self, spin: float, speed: float) -> None:
-        """Refuse a step that is too long for what the disc does at release.
+        """Refuse a step that is too long for the motion of the disc at release.
 
         Args:
             spin: Spin rate [rad/s].
             speed: Speed over the ground [m/s].
 
         Raises:
-            ConfigError: RK4 would blow up, so that the flight would mean nothing.
+            ConfigError: RK4 would be unstable.
         """
-        if self.model == 'precession':  # p and q follow the moments at once
+        if self.model == 'precession':  # p and q follow the moments without delay
             return
         V = speed + math.hypot(*self.wind.mean)
         steepest = self.disc.steepest_moment(self.aero or self.disc.aero)
@@ -118,7 +121,7 @@ class Setup:
 
     @cached_property
     def wind_data(self) -> WindData:
-        """Return the wind as the compiled equations take it."""
+        """Return the wind in the form of the compiled equations."""
         wind = self.wind
         X, Y, Z = (float(component) for component in wind.mean)
         z0 = float(wind.roughness_length)
@@ -154,14 +157,17 @@ def rates(spin: Any, V: Any, plant: Plant, steepest: float) -> tuple[Any, Any, A
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A flight that has ended; `position`, `drift` and `apex` are for people, in `map` axes.
+    """A finished flight; `position`, `drift` and `apex` are in `map` axes.
 
     Attributes:
-        landed: Whether it reached the ground; otherwise its time was up in the air.
+        launch: The release.
+        setup: The disc, its surroundings and the integration.
+        control: Control inputs, held for the whole flight.
+        landed: True if it reached the ground; else its time was up in the air.
         time: Time of flight [s].
         end: State at the landing, or at the end of the time.
         apex: Greatest height above the ground [m].
-        trajectory: Evenly timed samples, without the landing; empty unless asked for.
+        trajectory: Evenly timed samples, without the landing; empty without a sample rate.
     """
 
     launch: Launch
@@ -175,7 +181,7 @@ class Flight:
 
     @property
     def position(self) -> FloatArray:
-        """Return where it ended, in `map` axes, shape (3,) [m]; a landing has z = 0."""
+        """Return the position at the end in `map` axes [m], shape (3,); a landing has z = 0."""
         x, y, z = frames.map_from_paper(self.end[:3])
         return np.array([x, y, 0.0 if self.landed else z]) + 0.0  # no minus zeros
 
@@ -186,7 +192,7 @@ class Flight:
 
     @property
     def drift(self) -> float:
-        """Return how far left of the launch heading it ended [m]; negative is to the right."""
+        """Return the distance of the end to the left of the launch heading [m]."""
         c, s = rotation.cos_sin_degrees(self.launch.yaw)
         return s * self.end.X - c * self.end.Y
 
@@ -214,46 +220,36 @@ def fly(
         The flight; the landing is located to better than 1e-9 s of the RK4 solution.
 
     Raises:
-        ConfigError: A value out of range, a step too long for the spin, a release underground.
+        ConfigError: A value is out of range, the step is too long for the spin, or the release is
+            underground.
         IntegrationError: The disc turned or moved faster than the step can follow.
     """
     rows = check_flight(launch, setup, duration, ground=ground, sample_rate=sample_rate)
     samples = np.empty((rows, COLUMNS))
-    ended = integrator.integrate(
-        launch.state(),
-        setup.plant,
-        setup.disc.table_rows,
-        setup.disc.spin_terms,
-        checked_control(control),
-        setup.wind_data,
-        setup.noise(duration),
-        float(setup.step),
-        float(duration),
-        ground,
-        float(sample_rate),
-        samples,
-    )
-    if ended.status == integrator.LOST:
-        raise lost(ended.t, setup.step)
+    inputs = Inputs(checked_control(control), setup.wind_data, setup.noise(duration))
+    options = Options(float(setup.step), float(duration), ground, float(sample_rate))
+    result = integrator.integrate(launch.state(), setup.plant, inputs, options, samples)
+    if result.status == integrator.LOST:
+        raise lost(result.t, setup.step)
     return Flight(
         launch=launch,
         setup=setup,
         control=control,
-        landed=ended.status == integrator.LANDED,
-        time=ended.t,
-        end=ended.state,
-        apex=frames.flip(ended.apex_Z),
-        trajectory=Trajectory(samples[: ended.samples], setup.disc.diameter),
+        landed=result.status == integrator.LANDED,
+        time=result.t,
+        end=result.state,
+        apex=frames.flip(result.apex_Z),
+        trajectory=Trajectory(samples[: result.samples], setup.disc.diameter),
     )
 
 
 def check_flight(
     launch: Launch, setup: Setup, duration: float, *, ground: bool, sample_rate: float
 ) -> int:
-    """Check the arguments of `fly` together, and return how many samples it may write.
+    """Check the arguments of `fly` together, and return the greatest number of its samples.
 
     Raises:
-        ConfigError: As of `fly`.
+        ConfigError: As `fly`.
     """
     DURATION.check(duration)
     SAMPLE_RATE.check(sample_rate)
@@ -268,20 +264,20 @@ def check_flight(
 
 
 def lost(t: float, step: float) -> IntegrationError:
-    """Return the error of a flight that was lost at a time [s] with a step [s]."""
+    """Return the error for a flight that the step [s] could not follow at time `t` [s]."""
     return IntegrationError(
         f'at t = {t:.6g} s the disc turned or moved faster than steps of {step:g} s can follow; '
         'try a shorter step'
     )
 
 
-def is_ready() -> bool:
-    """Say whether `fly` needs no compilation first (about ten seconds, once per machine)."""
-    return is_compiled(integrator.integrate)
+def first_call_note() -> str:
+    """Return one line for users on why the next `fly` takes long; '' if it does not."""
+    return note_before(integrator.integrate, seconds=10)
 
 
 def _line(disc: Disc) -> Linear:
-    """Return the lines as the compiled equations take them; zeros where the disc has none."""
+    """Return the lines in the form of the compiled equations; zeros if the disc has none."""
     line = disc.linear
     if line is None:
         return Linear(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -289,7 +285,11 @@ def _line(disc: Disc) -> Linear:
 
 
 def checked_control(control: Control) -> Control:
-    """Return the control inputs as finite floats of a sensible size."""
+    """Return the control inputs as floats in their allowed range.
+
+    Raises:
+        ConfigError: A number is out of its range in `quantities`.
+    """
     inputs = [q.check(getattr(control, name), f'control {name}') for name, q in _INPUTS.items()]
     return Control._make([*inputs, int(control.axes)])
 

@@ -18,9 +18,8 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 
 setup = Setup(disc=disc_file.load_disc('frisbee'), step=1e-3)
-parts = (setup.plant, setup.disc.table_rows, setup.disc.spin_terms)
 launch = Launch(roll=20.0, spin=25.0, roll_rate=2.0, pitch_rate=-1.0, height=1.0)
-ends = [flown(released(launch.state(), axes), axes, 1e-3, 0.2, *parts) for axes in range(3)]
+ends = [flown(released(launch.state(), axes), axes, 1e-3, 0.2, setup.plant) for axes in range(3)]
 ends.append(fly(launch, setup, duration=0.2, ground=False).end)
 print(json.dumps([end._asdict() for end in ends]))
 """

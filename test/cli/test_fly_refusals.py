@@ -6,7 +6,7 @@ import re
 import pytest
 
 from cli.fly_command import refused
-from disc_sim_ros.physics import flight
+from disc_sim_ros.physics.kernels import jit
 
 pytestmark = pytest.mark.usefixtures('compiled')
 
@@ -166,7 +166,7 @@ def test_a_bad_disc_file_is_refused_in_one_line(fly, tmp_path):
 
 
 def test_what_is_refused_is_refused_before_the_compiler_speaks(fly, monkeypatch):
-    monkeypatch.setattr(flight, 'is_ready', lambda: False)
+    monkeypatch.setattr(jit, 'is_compiled', lambda _: False)
     refused(fly('--height', -1), '--height')
     refused(fly('--step', 0.1, '--spin', 500), '--step')
     refused(fly('--aero', 'linear', '--disc', 'wraith'), '--aero')
@@ -174,7 +174,7 @@ def test_what_is_refused_is_refused_before_the_compiler_speaks(fly, monkeypatch)
 
 
 def test_the_compiler_speaks_on_stderr(fly, monkeypatch):
-    monkeypatch.setattr(flight, 'is_ready', lambda: False)
+    monkeypatch.setattr(jit, 'is_compiled', lambda _: False)
     result = fly('--json')
     assert json.loads(result.out)['landed']
     assert re.fullmatch(r'fly: note: compiling [^\n]+\n', result.err)

@@ -67,7 +67,7 @@ def drag_and_pitch(setup, alpha):
 def test_drag_alone_takes_energy_from_the_path(launch, setup, control):
     """At every state, to rounding: m V dV/dt - m g dZ/dt is -C_Drag q S V; lift gives nothing."""
     disc, s = setup.disc, launch.state()
-    d = derivative(s, STILL, setup.plant, disc.table_rows, disc.spin_terms, control)
+    d = derivative(s, STILL, setup.plant, control)
     parts = [disc.mass * v * a for v, a in zip(s[3:6], d[3:6], strict=True)]
     parts.append(-disc.mass * setup.air.gravity * s.VZ)
     c = math.cos(math.radians(launch.angle_of_attack))
@@ -121,7 +121,7 @@ def power(setup, launch):
     """The rate of change of the energy at release in still air [W], and its largest part."""
     disc = setup.disc
     s = launch.state()
-    d = derivative(s, STILL, setup.plant, disc.table_rows, disc.spin_terms, NO_CONTROL)
+    d = derivative(s, STILL, setup.plant, NO_CONTROL)
     I_x, I_z = disc.inertia_diametral, disc.inertia_axial
     parts = (
         disc.mass * s.VX * d.VX, disc.mass * s.VY * d.VY, disc.mass * s.VZ * d.VZ,

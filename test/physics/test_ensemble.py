@@ -288,7 +288,7 @@ def test_an_interrupt_stops_it_soon():
 
 
 @pytest.mark.parametrize('turbulence', [0.0, 5.0])
-def test_it_is_ready_once_it_has_flown(turbulence):
+def test_after_a_flight_the_next_needs_no_compilation(turbulence):
     setup = Setup(disc=FRISBEE, step=0.02, wind=Wind(turbulence=turbulence))
     fly_many({}, setup, duration=0.1)
-    assert ensemble.is_ready(setup)
+    assert ensemble.first_call_note(setup) == ''

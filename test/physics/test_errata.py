@@ -194,7 +194,7 @@ def test_quaternion_rate_against_euler_rates(angles):
     disc = FRISBEE
     s = state((10.0, 1.0, 2.0), pqr, angles)
     plant = Setup(disc=disc).plant
-    rate = derivative(s, STILL, plant, disc.table_rows, disc.spin_terms, Control())
+    rate = derivative(s, STILL, plant, Control())
     e, e_dot = np.array(s[6:10]), np.array(rate[6:10])
     h = 1e-6
     after, before = frames.euler_from_quaternion([e + h * e_dot, e - h * e_dot])
@@ -670,7 +670,7 @@ def test_no_direction_no_push(alpha, spin):
 
     plant, s = Setup(disc=FRISBEE).plant, launch.state()
     a = flow(s, STILL)
-    at_90 = coefficients(a, s.r, plant, FRISBEE.table_rows, FRISBEE.spin_terms)
+    at_90 = coefficients(a, s.r, plant)
     assert at_90.Lift == pytest.approx(-0.0038 if alpha > 0 else -0.0037, abs=0.00005)
     # Nor does a flow of rounding size: 1e-9 of the airspeed is 1e-5 of a direction.
     hint = flow(state((1e-8, 0.0, 10.0 if alpha > 0 else -10.0)), STILL)

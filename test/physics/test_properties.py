@@ -121,12 +121,12 @@ def test_the_heading_turns_what_happens_and_nothing_else(launch, setup, wind, co
     degrees, tells 1e4 times as large.
     """
     tolerance = 32 * np.finfo(float).eps / NO_DIRECTION
-    disc, plant, s = setup.disc, setup.plant, launch.state()
+    plant, s = setup.plant, launch.state()
     aside = dataclasses.replace(launch, yaw=launch.yaw + yaw).state()
     here = Velocity(*wind.mean)
     there = Velocity(*turned(wind.mean, yaw).tolist())
-    a = derivative(s, here, plant, disc.table_rows, disc.spin_terms, control)
-    b = derivative(aside, there, plant, disc.table_rows, disc.spin_terms, control)
+    a = derivative(s, here, plant, control)
+    b = derivative(aside, there, plant, control)
     V = launch.speed + math.hypot(*wind.mean)
     q_inf_S = 0.5 * plant.rho * V**2 * plant.S  # with coefficients up to 10
     most = plant.g + 10.0 * q_inf_S / plant.m

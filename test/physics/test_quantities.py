@@ -8,7 +8,7 @@ import pytest
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.disc import Disc, LinearAero
 from disc_sim_ros.physics.environment import Air, Wind
-from disc_sim_ros.physics.kernels.batch_rows import NAMES
+from disc_sim_ros.physics.kernels.rows import NAMES
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.quantities import (
     ADVANCE_RATIO,

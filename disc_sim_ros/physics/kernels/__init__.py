@@ -1,1 +1,1 @@
-"""What numba compiles: the equations of motion, their integration, and many flights at once."""
+"""The compiled code: the equations of motion, their integration, and many flights at once."""

@@ -1,4 +1,4 @@
-"""Steady aerodynamic coefficients, eqns 19 to 21 and Fig. 3: scalar functions, compiled."""
+"""Steady aerodynamic coefficients, eqns 19 to 21 and Fig. 3, as compiled functions."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from disc_sim_ros.physics.kernels.simd import any_of, at, floor, table_row, wher
 
 
 class Linear(NamedTuple):
-    """Straight lines of Fig. 3 as the compiled equations take them; see `disc.LinearAero`."""
+    """Straight lines of Fig. 3 in the form of the compiled equations; see `disc.LinearAero`."""
 
     CL_0: float
     CL_alpha: float
@@ -41,7 +41,7 @@ def table_coefficients(alpha: float, table: FloatArray) -> tuple[float, float, f
     last = len(table) - 2.0
     rows_per_rad = (last + 1.0) / (table[len(table) - 1, 0] - table[0, 0])
     share = (alpha - table[0, 0]) * rows_per_rad
-    i = floor(min(max(0.0, share), last))  # right at once if the rows are even
+    i = floor(min(max(0.0, share), last))  # the right row at once if the rows are even
     low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha = table_row(table, i)
     while any_of(((alpha < low) & (i > 0.0)) | ((alpha >= high) & (i < last))):
         i = where(alpha < low, max(i - 1.0, 0.0), where(alpha >= high, min(i + 1.0, last), i))
@@ -54,9 +54,9 @@ def table_coefficients(alpha: float, table: FloatArray) -> tuple[float, float, f
 def spin_coefficients(
     advance_ratio: float, alpha: float, terms: FloatArray
 ) -> tuple[float, float]:
-    """Return the rolling moment and side force coefficients that the spin causes (eqn 21).
+    """Return the rolling moment and side force coefficients due to spin (eqn 21).
 
-    Bilinear, held outside the table, odd in the spin.
+    Bilinear inside the table, constant outside, odd in the spin.
 
     Args:
         advance_ratio: r c / (2 V), of either sign.
@@ -81,7 +81,10 @@ def _bilinear(C: FloatArray, i: float, f: float, j: float, g: float) -> float:
 
 @inline
 def _place(x: float, grid: FloatArray) -> tuple[float, float]:
-    """Return the cell of `grid` that holds `x` and how far in it is, 0 to 1 outside too."""
+    """Return the cell of `grid` that contains `x`, and the fraction of the way across it, 0 to 1.
+
+    Outside the grid these are the nearest cell and its nearest edge.
+    """
     i, low, high = 0.0, grid[0], grid[1]
     for k in range(1, len(grid) - 1):
         beyond = x >= grid[k]

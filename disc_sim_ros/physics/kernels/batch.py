@@ -1,4 +1,4 @@
-"""The loop over many flights, `simd.WIDTH` of them side by side, compiled."""
+"""The loops over many flights: one after the other, or `simd.WIDTH` at a time."""
 
 import math
 from typing import Any, NamedTuple
@@ -6,124 +6,173 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray, IntArray
-from disc_sim_ros.physics.kernels.batch_rows import (
-    NAMES,
-    control_of,
-    fill_table,
-    plant_of,
-    release,
-    wind_of,
-    write_end,
+from disc_sim_ros.physics.kernels.equations import Plant, State, Velocity
+from disc_sim_ros.physics.kernels.integrator import (
+    STATE_SIZE,
+    IntegrationResult,
+    IntegratorState,
+    Options,
+    initialise,
+    integrate,
+    integrate_from,
 )
-from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
-from disc_sim_ros.physics.kernels.integrator import STATE_SIZE, Progress, begin, go_on
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
-from disc_sim_ros.physics.kernels.rk4 import is_sound, rk4_step, top
+from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, rk4_step, top
+from disc_sim_ros.physics.kernels.rotation import cos_sin_degrees
+from disc_sim_ros.physics.kernels.rows import NAMES, YAW, fill_table, inputs_of, plant_of, release
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
-from disc_sim_ros.physics.kernels.wind import GustFilter, WindData
+from disc_sim_ros.physics.kernels.wind import GustFilter
 
-_CALM = Velocity(0.0, 0.0, 0.0)
+_NO_GUST = Velocity(0.0, 0.0, 0.0)
 _NO_FILTER = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Ends(NamedTuple):
+    """The ends of n flights: the arrays of `ensemble.Landings`, filled by the loops."""
+
+    status: IntArray  # FLYING, LANDED or LOST, shape (n,)
+    time: FloatArray  # s, shape (n,)
+    apex: FloatArray  # m above the ground, shape (n,)
+    drift: FloatArray  # m left of the launch heading, shape (n,)
+    states: FloatArray  # shape (n, 14)
+
+
 class LaneState(NamedTuple):
-    """Who flies in each lane, with what numbers, and how far they are; a column for each lane."""
+    """The flight in each lane, its numbers and its progress; a column for each lane."""
 
     flight: IntArray  # its place in the rows, shape (WIDTH,)
     row: FloatArray  # its row, shape (len(NAMES), WIDTH)
     table: FloatArray  # its table, shape (n, 8 WIDTH)
     state: FloatArray  # shape (14, WIDTH)
     apex_Z: FloatArray  # so far, shape (1, WIDTH), as those below
-    steps: FloatArray  # made
-    manned: FloatArray  # 1, or 0 where nobody flies
-    ending: FloatArray  # 1 where the next step would end it
+    steps: FloatArray  # done
+    active: FloatArray  # 1, or 0 for a lane without a flight
+    ending: FloatArray  # 1 where the next step would end the flight
+
+
+class Workspace(NamedTuple):
+    """Arrays that a loop works in; each thread needs its own."""
+
+    table: FloatArray  # of one flight, shape (n, 8)
+    no_samples: FloatArray  # shape (0, 18)
+    lanes: LaneState
+
+
+def workspace(plant: Plant) -> Workspace:
+    """Return a workspace without flights, for tables as long as that of `plant`."""
+    n = len(plant.table)
+    lanes = LaneState(
+        flight=np.zeros(WIDTH, np.int64),
+        row=np.ones((len(NAMES), WIDTH)),
+        table=np.zeros((n, 8 * WIDTH)),
+        state=np.ones((STATE_SIZE, WIDTH)),
+        apex_Z=np.zeros((1, WIDTH)),
+        steps=np.zeros((1, WIDTH)),
+        active=np.zeros((1, WIDTH)),
+        ending=np.zeros((1, WIDTH)),
+    )
+    return Workspace(np.empty((n, 8)), np.empty((0, 18)), lanes)
 
 
 @entry
-def fly_lanes(
+def fly_rows(
     rows: FloatArray,
     start: int,
     plant: Plant,
-    base_table: FloatArray,
-    spin_terms: FloatArray,
-    base_control: Control,
-    wind: WindData,
-    noise: FloatArray,
-    step: float,
-    duration: float,
-    ground: bool,
-    status: IntArray,
-    time: FloatArray,
-    apex: FloatArray,
-    drift: FloatArray,
-    states: FloatArray,
+    inputs: Inputs,
+    options: Options,
+    ends: Ends,
+    space: Workspace,
 ) -> None:
-    """Do what `batch_rows.fly_rows` does, to the same bits, without gusts.
+    """Fly rows one after the other.
 
-    Whole steps are made in all lanes at once. A flight that such a step would end is ended alone,
-    from the state before it, and the next one takes its lane.
+    Args:
+        rows: A flight in each row, shape (m, len(NAMES)).
+        start: Place of the first flight in `ends`.
+        plant: Constants that all flights share; the rows replace the others.
+        inputs: Moments, profile of the wind and noise that all flights share.
+        options: Step, duration and ground.
+        ends: Filled from `start` on.
+        space: See `workspace`.
     """
-    no_samples = np.empty((0, 18))
-    one_table = np.empty(base_table.shape)
-    whole = _whole_steps(step, duration)
-    lowest = 0.0 if ground else math.inf  # Z down
-    a = _empty(len(base_table))
-    boarded = landed = 0
+    table = space.table
+    for i in range(len(rows)):
+        row = rows[i]
+        fill_table(row, plant.table, table)
+        own_plant, own_inputs = plant_of(row, plant, table), inputs_of(row, inputs)
+        result = integrate(release(row), own_plant, own_inputs, options, space.no_samples)
+        _write_end(row, result, start + i, ends)
+
+
+@jit
+def _write_end(row: FloatArray, result: IntegrationResult, i: int, ends: Ends) -> None:
+    """Write the end of flight `i`."""
+    ends.status[i] = result.status
+    ends.time[i] = result.t
+    ends.apex[i] = 0.0 - result.apex_Z
+    c_yaw, s_yaw = cos_sin_degrees(row[YAW])
+    ends.drift[i] = s_yaw * result.state.X - c_yaw * result.state.Y
+    for k in range(STATE_SIZE):
+        ends.states[i, k] = result.state[k]
+
+
+@entry
+def fly_simd(
+    rows: FloatArray,
+    start: int,
+    plant: Plant,
+    inputs: Inputs,
+    options: Options,
+    ends: Ends,
+    space: Workspace,
+) -> None:
+    """Fly rows without gusts, WIDTH at a time; arguments and results are those of `fly_rows`.
+
+    All lanes make whole steps together. A flight that the next step would end is integrated to its
+    end alone, from the state before that step, and its lane takes the next row. Lanes without a
+    flight compute numbers that are not used.
+    """
+    step = options.step
+    whole = _whole_steps(step, options.duration)
+    lowest = 0.0 if options.ground else math.inf  # Z down
+    a, table, no_samples = space.lanes, space.table, space.no_samples
+    started = ended = 0
     change = True
-    while landed < len(rows):
+    while ended < len(rows):
         for lane in range(WIDTH if change else 0):
             if a.ending[0, lane] > 0.0:
                 i = a.flight[lane]
-                fill_table(rows[i], base_table, one_table)
-                end = go_on(
-                    _alone(a, lane),
-                    a.apex_Z[0, lane],
-                    plant_of(rows[i], plant),
-                    one_table,
-                    spin_terms,
-                    control_of(rows[i], base_control),
-                    wind_of(rows[i], wind),
-                    noise,
-                    step,
-                    duration,
-                    ground,
-                    0.0,
-                    no_samples,
-                )
-                write_end(rows[i], end, start + i, status, time, apex, drift, states)
-                a.manned[0, lane] = a.ending[0, lane] = 0.0
-                landed += 1
-            if a.manned[0, lane] == 0.0 and boarded < len(rows):
-                fill_table(rows[boarded], base_table, one_table)
-                p = begin(
-                    release(rows[boarded]),
-                    plant_of(rows[boarded], plant),
-                    one_table,
-                    spin_terms,
-                    control_of(rows[boarded], base_control),
-                    wind_of(rows[boarded], wind),
-                    noise,
-                )
-                _board(a, lane, boarded, rows[boarded], one_table, p.state)
-                boarded += 1
+                fill_table(rows[i], plant.table, table)
+                own_plant, own_inputs = plant_of(rows[i], plant, table), inputs_of(rows[i], inputs)
+                x, apex_Z = _lane(a, lane), a.apex_Z[0, lane]
+                result = integrate_from(x, apex_Z, own_plant, own_inputs, options, no_samples)
+                _write_end(rows[i], result, start + i, ends)
+                a.active[0, lane] = a.ending[0, lane] = 0.0
+                ended += 1
+            if a.active[0, lane] == 0.0 and started < len(rows):
+                row = rows[started]
+                fill_table(row, plant.table, table)
+                own_plant, own_inputs = plant_of(row, plant, table), inputs_of(row, inputs)
+                x = initialise(release(row), own_plant, own_inputs)
+                _fill_lane(a, lane, started, row, table, x.state)
+                started += 1
 
-        s, k, apex_Z = _loaded(a.state), element(a.steps, 0), element(a.apex_Z, 0)
-        plants = plant_of(a.row, plant)
-        control, winds = control_of(a.row, base_control), wind_of(a.row, wind)
-        x = rk4_step(s, step, _CALM, _CALM, winds, plants, a.table, spin_terms, control)
-        goes_on = is_sound(x, step, plants) & (x.Z <= lowest) & (k < whole)  # noqa: SIM300
-        ending = where(goes_on, 0.0, element(a.manned, 0))
+        s, k, apex_Zs = _load_state(a.state), element(a.steps, 0), element(a.apex_Z, 0)
+        plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
+        next_s = rk4_step(s, step, _NO_GUST, _NO_GUST, plants, all_inputs)
+        goes_on = is_sound(next_s, step, plants) & (next_s.Z <= lowest) & (k < whole)  # noqa: SIM300
+        ending = where(goes_on, 0.0, element(a.active, 0))
         change = any_of(ending > 0.0)
         if change:
-            x = _chosen(goes_on, x, s)
+            next_s = _select(goes_on, next_s, s)
             store(a.ending, 0, ending)
-        turned = (s.VZ < 0.0) & (x.VZ >= 0.0)
-        if any_of(turned):
-            apex_Z = where(turned, min(apex_Z, top(s, x, step)), apex_Z)
-        store(a.apex_Z, 0, min(apex_Z, x.Z))
+        over_the_top = (s.VZ < 0.0) & (next_s.VZ >= 0.0)
+        if any_of(over_the_top):
+            apex_Zs = where(over_the_top, min(apex_Zs, top(s, next_s, step)), apex_Zs)
+        store(a.apex_Z, 0, min(apex_Zs, next_s.Z))
         store(a.steps, 0, where(goes_on, k + 1.0, k))
         for j in range(STATE_SIZE):
-            store(a.state, j, x[j])
+            store(a.state, j, next_s[j])
 
 
 @jit
@@ -136,36 +185,26 @@ def _whole_steps(step: float, duration: float) -> float:
 
 
 @jit
-def _empty(rows: int) -> LaneState:
-    """Return lanes in which nobody flies; what is computed there is not looked at."""
-    return LaneState(
-        np.zeros(WIDTH, np.int64),
-        np.ones((len(NAMES), WIDTH)),
-        np.zeros((rows, 8 * WIDTH)),
-        np.ones((STATE_SIZE, WIDTH)),
-        np.zeros((1, WIDTH)),
-        np.zeros((1, WIDTH)),
-        np.zeros((1, WIDTH)),
-        np.zeros((1, WIDTH)),
-    )
-
-
-@jit
-def _board(a: LaneState, lane: int, i: int, row: FloatArray, table: FloatArray, s: State) -> None:
-    """Let a flight begin in a lane."""
+def _fill_lane(
+    a: LaneState, lane: int, i: int, row: FloatArray, table: FloatArray, s: State
+) -> None:
+    """Start flight `i` in a lane."""
     a.flight[lane] = i
-    a.row[:, lane] = row
-    a.table[:, 8 * lane : 8 * lane + 8] = table
+    for j in range(len(row)):
+        a.row[j, lane] = row[j]
+    for j in range(len(table)):
+        for k in range(8):
+            a.table[j, 8 * lane + k] = table[j, k]
     for k in range(STATE_SIZE):
         a.state[k, lane] = s[k]
     a.apex_Z[0, lane] = s.Z
     a.steps[0, lane] = 0.0
-    a.manned[0, lane] = 1.0
+    a.active[0, lane] = 1.0
 
 
 @inline
-def _alone(a: LaneState, lane: int) -> Progress:
-    """Return the flight in a lane as scalar functions take it."""
+def _lane(a: LaneState, lane: int) -> IntegratorState:
+    """Return the flight in a lane as floats."""
     e = a.state
     s = State(
         e[0, lane],
@@ -183,11 +222,13 @@ def _alone(a: LaneState, lane: int) -> Progress:
         e[12, lane],
         e[13, lane],
     )
-    return Progress(int(a.steps[0, lane]), s, _CALM, _NO_FILTER, _CALM, _CALM, 0)
+    steps = int(a.steps[0, lane])
+    return IntegratorState(steps, s, _NO_GUST, _NO_FILTER, _NO_GUST, _NO_GUST, 0)
 
 
 @inline
-def _loaded(a: FloatArray) -> State:
+def _load_state(a: FloatArray) -> State:
+    """Return the states in all lanes, shape (14, WIDTH), as vectors."""
     return State(
         element(a, 0),
         element(a, 1),
@@ -207,7 +248,7 @@ def _loaded(a: FloatArray) -> State:
 
 
 @inline
-def _chosen(condition: Any, a: State, b: State) -> State:
+def _select(condition: Any, a: State, b: State) -> State:
     """Return the state `a` in the lanes where the condition holds, else `b`."""
     return State(
         where(condition, a.X, b.X),

@@ -1,20 +1,19 @@
 """The equations of motion of a spinning disc, in the paper's letters with its equation numbers.
 
-Written in axes 2 that tilt with the disc but do not take part in its spin ("despun"), so that the
-spin does not limit the step: they are the paper's body axes turned back about z by the spin angle
-sigma, and their own angular velocity is (p, q, 0). Position and velocity are in earth axes 1. What
-is corrected against the printed equations, and why, stands in docs/deviations.md.
+They are written in axes 2 that tilt with the disc but do not spin with it ("despun"), so that the
+spin does not limit the step. These are the paper's body axes turned back about z by the spin angle
+sigma; their own angular velocity is (p, q, 0). Position and velocity are in earth axes 1.
+docs/deviations.md lists each correction of the printed equations with its reason.
 
-Functions of floats, or of `lanes`, which hold a float for each of several flights: numba compiles
-them for the node, the offline flight and the ensemble alike, and they run as plain Python with
-NUMBA_DISABLE_JIT=1. Of what differs between flights nothing is asked with `if`.
+Each function takes floats, or SIMD vectors with one float for each of several flights (`simd`).
+numba compiles the same source for the node, the offline flight and the ensemble; without numba it
+runs as plain Python. Never branch on per-flight values with `if`; use `where`.
 """
 
 import math
 from typing import NamedTuple
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.kernels import rotation
 from disc_sim_ros.physics.kernels.aerodynamics import (
     Linear,
     linear_coefficients,
@@ -22,18 +21,18 @@ from disc_sim_ros.physics.kernels.aerodynamics import (
     table_coefficients,
 )
 from disc_sim_ros.physics.kernels.jit import inline
+from disc_sim_ros.physics.kernels.rotation import rotation_elements
 from disc_sim_ros.physics.kernels.simd import where
 
 EXACT, CONSTANT_SPIN, PRECESSION = range(3)  # rigid-body models
 BODY, WIND = range(2)  # axes in which the moment coefficients act: 3 or 4
 DISC, DISC_BODY, DISC_AIR = range(3)  # axes of a moment given in N m
 
-# Within this fraction of the airspeed the flow has no direction in the plane of the disc: what is
-# defined by that direction fades to nothing (0.006 degrees around alpha = +-90 degrees).
+# Where the in-plane airspeed is below this fraction of the airspeed (within 0.006 degrees of
+# alpha = +-90 degrees) the flow has no direction in the plane of the disc, and every effect that
+# needs this direction fades to zero.
 NO_DIRECTION = 1e-4
 _TINY = 1e-300
-
-_rotation = inline(rotation.rotation_elements)
 
 
 class State(NamedTuple):
@@ -56,7 +55,7 @@ class State(NamedTuple):
 
 
 class Plant(NamedTuple):
-    """Constants of a flight: the disc, the air and the choice of model."""
+    """What flies, and in what: constants of the disc and the air, and the choice of model."""
 
     m: float  # kg
     c: float  # m
@@ -72,6 +71,8 @@ class Plant(NamedTuple):
     moment_axes: int  # BODY or WIND
     use_linear: bool  # straight lines instead of the table
     line: Linear
+    table: FloatArray  # steady coefficients, see `aerodynamics.table_coefficients`
+    spin_terms: FloatArray  # see `aerodynamics.spin_coefficients`; empty if the disc has none
 
 
 class Velocity(NamedTuple):
@@ -83,7 +84,7 @@ class Velocity(NamedTuple):
 
 
 class Control(NamedTuple):
-    """Control inputs: coefficients added in eqns 22 to 24, and a moment in N m, both held."""
+    """Control inputs, held over a step: coefficients of eqns 22 to 24, and a moment in N m."""
 
     C_L: float = 0.0  # roll, right edge down positive
     C_M: float = 0.0  # pitch, nose up positive
@@ -95,7 +96,7 @@ class Control(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Aerodynamic coefficients without controls and damping, axes 3 and 4."""
+    """Aerodynamic coefficients without control inputs and damping, axes 3 and 4."""
 
     Lift: float
     Drag: float
@@ -105,7 +106,7 @@ class Coefficients(NamedTuple):
 
 
 class Flow(NamedTuple):
-    """How the air meets the disc: angles and components in despun axes 2 and in axes 3."""
+    """The air relative to the disc: components and angles in despun axes 2 and in axes 3."""
 
     u: float  # velocity relative to the air, despun axes 2 [m/s]
     v: float
@@ -119,11 +120,11 @@ class Flow(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Moment in despun axes 2, split by what it depends on: (L, M) + D (p, q), and N."""
+    """Moment in despun axes 2: (L, M) + D (p, q) about x and y, and N about z."""
 
     L: float  # N m, at p = q = 0
     M: float
-    N: float  # N m, complete
+    N: float  # N m, spin damping included
     D_xx: float  # N m s, damping of p and q; symmetric
     D_xy: float
     D_yy: float
@@ -131,15 +132,15 @@ class Moment(NamedTuple):
 
 @inline
 def flow(s: State, wind: Velocity) -> Flow:
-    """Return how the air meets the disc (eqns 9 and 15 to 17), for the wind at the disc.
+    """Return the flow relative to the disc, for the wind at the disc (eqns 9 and 15 to 17).
 
     Where the flow has no direction in the plane of the disc (alpha = +-90 degrees, no airspeed)
-    d shrinks to 0, and with it all that this direction defines: no sideways motion arises.
+    the vector d shrinks to 0, and so does every effect along it: no sideways motion arises.
     """
     V_X = s.VX - wind.X
     V_Y = s.VY - wind.Y
     V_Z = s.VZ - wind.Z
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = _rotation(s.e0, s.e1, s.e2, s.e3)
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation_elements(s.e0, s.e1, s.e2, s.e3)
     u = xx * V_X + yx * V_Y + zx * V_Z
     v = xy * V_X + yy * V_Y + zy * V_Z
     w = xz * V_X + yz * V_Y + zz * V_Z
@@ -150,18 +151,16 @@ def flow(s: State, wind: Velocity) -> Flow:
 
 
 @inline
-def coefficients(
-    a: Flow, r: float, plant: Plant, table: FloatArray, spin_terms: FloatArray
-) -> Coefficients:
-    """Return the coefficients without controls and damping (eqns 19 to 23)."""
+def coefficients(a: Flow, r: float, plant: Plant) -> Coefficients:
+    """Return the coefficients without control inputs and damping (eqns 19 to 23)."""
     if plant.use_linear:
         C_Lift, C_Drag, C_M = linear_coefficients(a.alpha, plant.line)
     else:
-        C_Lift, C_Drag, C_M = table_coefficients(a.alpha, table)
+        C_Lift, C_Drag, C_M = table_coefficients(a.alpha, plant.table)
     C_L = C_Side = 0.0
-    if len(spin_terms) > 0:
+    if len(plant.spin_terms) > 0:
         AdvR = r * plant.c / (2.0 * max(a.V, _TINY))  # eqn 63
-        C_L, C_Side = spin_coefficients(AdvR, a.alpha, spin_terms)
+        C_L, C_Side = spin_coefficients(AdvR, a.alpha, plant.spin_terms)
     return Coefficients(C_Lift, C_Drag, C_Side, C_L, C_M)
 
 
@@ -169,8 +168,8 @@ def coefficients(
 def force(a: Flow, C: Coefficients, plant: Plant) -> tuple[float, float, float]:
     """Return the aerodynamic force in despun axes 2 [N] (eqns 26, 28, 30 and 31).
 
-    q_inf S cos alpha is rho V S u3 / 2 and q_inf S sin alpha is rho V S w / 2: no airspeed is no
-    special case.
+    q_inf S cos alpha is rho V S u3 / 2, and q_inf S sin alpha is rho V S w / 2: zero airspeed
+    needs no special case.
     """
     qS_V = 0.5 * plant.rho * a.V * plant.S
     lift_in_plane = C.Lift * a.w
@@ -183,9 +182,10 @@ def force(a: Flow, C: Coefficients, plant: Plant) -> tuple[float, float, float]:
 
 @inline
 def moment(a: Flow, s: State, C: Coefficients, plant: Plant, control: Control) -> Moment:
-    """Return the moment of the air and of the controls in despun axes 2 (eqns 22 to 25, 27, 32).
+    """Return the moment of air and control inputs in despun axes 2 (eqns 22 to 25, 27 and 32).
 
-    Damping is per c / (2 V): its slope against a rate is q_inf S c^2 / (2 V) = rho V S c^2 / 4.
+    Damping coefficients are per rate times c / (2 V): the slope of the moment against a rate is
+    q_inf S c^2 / (2 V) = rho V S c^2 / 4.
     """
     qS_V = 0.5 * plant.rho * a.V * plant.S
     qSc = qS_V * a.V * plant.c
@@ -198,7 +198,8 @@ def moment(a: Flow, s: State, C: Coefficients, plant: Plant, control: Control) -
     M_control = qSc * control.C_M
     N = qSc * control.C_N + qScc_2V * plant.C_Nr * s.r
 
-    # About axes 3, as above, or about axes 4, where roll and spin mix by alpha (T_34, corrected).
+    # Coefficients act about axes 3, as above, or about axes 4, whose roll and spin axes are turned
+    # by alpha (T_34, corrected).
     if plant.moment_axes == WIND:
         per_V = 1.0 / max(a.V, _TINY)
         cos_alpha = a.u3 * per_V
@@ -209,8 +210,8 @@ def moment(a: Flow, s: State, C: Coefficients, plant: Plant, control: Control) -
         L_p = cos_alpha * L_p
         N = cos_alpha * N + sin_alpha * roll
 
-    # From axes 3 to axes 2. Commands fall back on the disc's own x where x3 has no direction, and
-    # damping is then the same about every diameter.
+    # From axes 3 to axes 2. Where x3 has no direction, control inputs act about the disc's own x
+    # axis, and damping is the same about every diameter.
     x_x = a.d_x + a.no_direction
     L = L_steady * a.d_x - M_steady * a.d_y + L_control * x_x - M_control * a.d_y
     M = L_steady * a.d_y + M_steady * a.d_x + L_control * a.d_y + M_control * x_x
@@ -227,7 +228,7 @@ def moment(a: Flow, s: State, C: Coefficients, plant: Plant, control: Control) -
 
 @inline
 def _axes_of_moment(axes: int, sigma: float, x_x: float, x_y: float) -> tuple[float, float]:
-    """Return the x axis, in despun axes 2, of the axes that a moment in N m is given in."""
+    """Return the x axis, in despun axes 2, of the axes of a moment given in N m."""
     if axes == DISC_BODY:
         return math.cos(sigma), math.sin(sigma)
     if axes == DISC_AIR:
@@ -240,38 +241,29 @@ def precession_rates(r: float, m: Moment, I_z: float) -> tuple[float, float]:
     """Return p, q at which the moments balance the gyroscopic ones (eqns 53 and 54, corrected).
 
     With dp/dt = dq/dt = 0 in axes that do not spin, eqns 51 and 52 read L = q r I_z and
-    M = -p r I_z, where L and M hold the damping of these very rates: two linear equations.
+    M = -p r I_z. L and M include the damping by p and q: two linear equations in p and q.
     """
     H = r * I_z
     det = m.D_xx * m.D_yy + (H - m.D_xy) * (H + m.D_xy)
-    nothing = det <= _TINY  # neither spin nor damping sets a rate
-    per_det = 1.0 / where(nothing, 1.0, det)
+    singular = det <= _TINY  # neither spin nor damping determines the rates
+    per_det = 1.0 / where(singular, 1.0, det)
     p = (-m.D_yy * m.L - (H - m.D_xy) * m.M) * per_det
     q = (-m.D_xx * m.M + (H + m.D_xy) * m.L) * per_det
-    return where(nothing, 0.0, p), where(nothing, 0.0, q)
+    return where(singular, 0.0, p), where(singular, 0.0, q)
 
 
 @inline
-def derivative(
-    s: State,
-    wind: Velocity,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-) -> State:
+def derivative(s: State, wind: Velocity, plant: Plant, control: Control) -> State:
     """Return the rate of change of the state: eqns 10, 11 and 33 in despun axes.
 
     Args:
         s: State; its quaternion has unit length.
-        wind: Wind at the disc, where the air moves to.
+        wind: Velocity of the air at the disc.
         plant: Constants of the flight, with the rigid-body model.
-        table: Steady coefficients, see `aerodynamics.table_coefficients`.
-        spin_terms: See `aerodynamics.spin_coefficients`; empty where the disc has none.
         control: Control inputs.
     """
     a = flow(s, wind)
-    C = coefficients(a, s.r, plant, table, spin_terms)
+    C = coefficients(a, s.r, plant)
     m = moment(a, s, C, plant, control)
     p, q, r = s.p, s.q, s.r
     p_dot = q_dot = r_dot = 0.0
@@ -288,7 +280,7 @@ def derivative(
 
     # Eqns 10 and 33 in earth axes: m dV/dt = T_21 F + m g.
     X, Y, Z = force(a, C, plant)
-    xx, xy, xz, yx, yy, yz, zx, zy, zz = _rotation(s.e0, s.e1, s.e2, s.e3)
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation_elements(s.e0, s.e1, s.e2, s.e3)
     per_m = 1.0 / plant.m
     V_X_dot = (xx * X + xy * Y + xz * Z) * per_m
     V_Y_dot = (yx * X + yy * Y + yz * Z) * per_m
@@ -312,21 +304,14 @@ def derivative(
 
 
 @inline
-def consistent(
-    s: State,
-    wind: Velocity,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-) -> State:
+def consistent(s: State, wind: Velocity, plant: Plant, control: Control) -> State:
     """Return the state with a unit quaternion and, in the precession model, with its p and q."""
     n = 1.0 / math.sqrt(s.e0 * s.e0 + s.e1 * s.e1 + s.e2 * s.e2 + s.e3 * s.e3)
     e0, e1, e2, e3 = s.e0 * n, s.e1 * n, s.e2 * n, s.e3 * n
     p, q = s.p, s.q
     if plant.model == PRECESSION:
         a = flow(s, wind)
-        C = coefficients(a, s.r, plant, table, spin_terms)
+        C = coefficients(a, s.r, plant)
         p, q = precession_rates(s.r, moment(a, s, C, plant, control), plant.I_z)
     return State(s.X, s.Y, s.Z, s.VX, s.VY, s.VZ, e0, e1, e2, e3, p, q, s.r, s.sigma)
 
@@ -338,9 +323,9 @@ _TAN_22_5, _TAN_67_5 = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0
 def arctangent(y: float, x: float) -> float:
     """Return atan2(y, x) for x >= 0 [rad], to 3e-16; 0 where both are 0 or below 1e-300.
 
-    An angle is reckoned from 0, 45 or 90 degrees, whichever is within 22.5 degrees. There a
-    polynomial in t^2 meets (atan(t) / t - 1) / t^2 in the Chebyshev points, within 4e-17 of
-    atan(t) / t.
+    The angle is the nearest of 0, 45 and 90 degrees plus atan(t), |t| <= tan 22.5 degrees. A
+    polynomial in t^2 interpolates (atan(t) / t - 1) / t^2 at the Chebyshev points; it gives
+    atan(t) / t to 4e-17.
     """
     a = abs(y)
     steep, flat = a > _TAN_67_5 * x, a <= _TAN_22_5 * x

@@ -1,4 +1,4 @@
-"""A flight in fixed steps from release to the ground, compiled as a whole."""
+"""The integration of a flight in fixed steps, from release to the ground."""
 
 import math
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from disc_sim_ros.physics.kernels.equations import (
     moment,
 )
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
-from disc_sim_ros.physics.kernels.rk4 import is_sound, lerp, rk4_step, top, touchdown
+from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, lerp, rk4_step, top, touchdown
 from disc_sim_ros.physics.kernels.wind import (
     GUST_INTERVAL,
     GustFilter,
@@ -32,20 +32,29 @@ FLYING, LANDED, LOST = range(3)  # LOST: beyond the numbers or the rates that a 
 STATE_SIZE = len(State._fields)
 
 
-class Progress(NamedTuple):
-    """A flight between two steps: all that the next one needs."""
+class Options(NamedTuple):
+    """How a flight is integrated."""
 
-    k: int  # steps done
+    step: float  # s
+    duration: float  # longest time of flight [s]
+    ground: bool  # end where Z = 0 is crossed from above
+    sample_rate: float  # 1/s
+
+
+class IntegratorState(NamedTuple):
+    """A flight between two steps: everything that the next step needs."""
+
+    steps: int  # done since the release
     state: State
     gust: Velocity  # at the disc, now
-    filters: GustFilter  # that drew `next_drawn`
-    drawn: Velocity  # the gusts at both ends of the present interval
-    next_drawn: Velocity
+    filters: GustFilter  # that drew `end_gust`
+    start_gust: Velocity  # at the start of the present gust interval
+    end_gust: Velocity  # and at its end
     interval: int  # its number, from 0
 
 
-class Ended(NamedTuple):
-    """How a flight ended: why, when, where, its apex and how many samples were written."""
+class IntegrationResult(NamedTuple):
+    """The end of a flight: why, when and where; its apex, and the number of samples."""
 
     status: int  # FLYING (time is up), LANDED or LOST (the state is the last sound one)
     t: float  # s
@@ -55,162 +64,109 @@ class Ended(NamedTuple):
 
 
 @jit
-def begin(
-    s: State,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-    wind: WindData,
-    noise: FloatArray,
-) -> Progress:
-    """Return a flight at its release; see `integrate` for the arguments."""
-    gust = next_drawn = Velocity(0.0, 0.0, 0.0)
+def initialise(s: State, plant: Plant, inputs: Inputs) -> IntegratorState:
+    """Return a flight at its release in the state `s`."""
+    wind, noise = inputs.wind, inputs.noise
+    gust = end_gust = Velocity(0.0, 0.0, 0.0)
     filters = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
     if len(noise) > 0:
         filters = first_filter(noise[0])
         gust = gust_of(filters, s.Z, wind)
         V = _airspeed(s, wind_at(s.Z, gust, wind))
         filters = next_filter(filters, V, s.Z, GUST_INTERVAL, noise[1])
-        next_drawn = gust_of(filters, s.Z, wind)
-    s = consistent(s, wind_at(s.Z, gust, wind), plant, table, spin_terms, control)
-    return Progress(0, s, gust, filters, gust, next_drawn, 0)
+        end_gust = gust_of(filters, s.Z, wind)
+    s = consistent(s, wind_at(s.Z, gust, wind), plant, inputs.control)
+    return IntegratorState(0, s, gust, filters, gust, end_gust, 0)
 
 
 @inline
 def advance(
-    p: Progress,
-    h: float,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-    wind: WindData,
-    noise: FloatArray,
-    step: float,
-) -> Progress:
-    """Return a flight one step further: `h` is `step`, or less for the last one."""
-    s = p.state
-    gust, filters, drawn, next_drawn, i = p.gust, p.filters, p.drawn, p.next_drawn, p.interval
+    x: IntegratorState, h: float, step: float, plant: Plant, inputs: Inputs
+) -> IntegratorState:
+    """Return a flight one step further: `h` is `step`, or less for the last one [s]."""
+    s, gust = x.state, x.gust
+    filters, start_gust, end_gust, i = x.filters, x.start_gust, x.end_gust, x.interval
+    wind, noise = inputs.wind, inputs.noise
     if len(noise) > 0:
-        t = p.k * step
-        while t / GUST_INTERVAL > i + 1 - 1e-9:  # once for a step that divides the interval
+        t = x.steps * step
+        while t / GUST_INTERVAL > i + 1 - 1e-9:  # once, for a step that divides the interval
             i += 1
-            drawn = next_drawn
-            V = _airspeed(s, wind_at(s.Z, p.gust, wind))
+            start_gust = end_gust
+            V = _airspeed(s, wind_at(s.Z, x.gust, wind))
             filters = next_filter(filters, V, s.Z, GUST_INTERVAL, noise[i + 1])
-            next_drawn = gust_of(filters, s.Z, wind)
-        gust = lerp(drawn, next_drawn, min((t + h) / GUST_INTERVAL - i, 1.0))
-    s = rk4_step(s, h, p.gust, gust, wind, plant, table, spin_terms, control)
-    return Progress(p.k + 1, s, gust, filters, drawn, next_drawn, i)
+            end_gust = gust_of(filters, s.Z, wind)
+        gust = lerp(start_gust, end_gust, min((t + h) / GUST_INTERVAL - i, 1.0))
+    s = rk4_step(s, h, x.gust, gust, plant, inputs)
+    return IntegratorState(x.steps + 1, s, gust, filters, start_gust, end_gust, i)
 
 
 @entry
 def integrate(
-    s: State,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-    wind: WindData,
-    noise: FloatArray,
-    step: float,
-    duration: float,
-    ground: bool,
-    sample_rate: float,
-    samples: FloatArray,
-) -> Ended:
-    """Fly until the ground or for `duration`, and write evenly timed samples.
+    s: State, plant: Plant, inputs: Inputs, options: Options, samples: FloatArray
+) -> IntegrationResult:
+    """Integrate a flight to its end, and write evenly timed samples.
 
     Args:
         s: State at release.
         plant: Constants of the flight.
-        table: Steady coefficients, see `aerodynamics.table_coefficients`.
-        spin_terms: See `aerodynamics.spin_coefficients`.
-        control: Control inputs, held.
-        wind: Wind of the flight.
-        noise: Standard normal numbers, shape (n, 5), a row for each drawn gust; no rows for none.
-        step: Integration step [s].
-        duration: Longest time of flight [s].
-        ground: End where Z = 0 is crossed from above.
-        sample_rate: Samples per second [1/s].
-        samples: Filled with t, the state and the wind X, Y, Z; shape (n, 18), as many rows as are
-            asked for. A sample inside a step is a shorter step from the same start.
+        inputs: Control inputs, held for the whole flight, wind and gust noise.
+        options: Step, duration, ground and sample rate.
+        samples: Filled with t, the state and the wind X, Y, Z; shape (n, 18), with as many rows
+            as samples are wanted. A sample inside a step is a shorter step from the same start.
     """
-    p = begin(s, plant, table, spin_terms, control, wind, noise)
+    x = initialise(s, plant, inputs)
     if len(samples) > 0:
-        _write(samples[0], 0.0, p.state, wind_at(s.Z, p.gust, wind))
-    return go_on(
-        p,
-        s.Z,
-        plant,
-        table,
-        spin_terms,
-        control,
-        wind,
-        noise,
-        step,
-        duration,
-        ground,
-        sample_rate,
-        samples,
-    )
+        _write_sample(samples[0], 0.0, x.state, wind_at(s.Z, x.gust, inputs.wind))
+    return integrate_from(x, s.Z, plant, inputs, options, samples)
 
 
 @jit
-def go_on(
-    p: Progress,
+def integrate_from(
+    x: IntegratorState,
     apex_Z: float,
     plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-    wind: WindData,
-    noise: FloatArray,
-    step: float,
-    duration: float,
-    ground: bool,
-    sample_rate: float,
+    inputs: Inputs,
+    options: Options,
     samples: FloatArray,
-) -> Ended:
-    """Fly on from `p`, with the apex so far, to the end; see `integrate` for the arguments."""
+) -> IntegrationResult:
+    """Integrate a flight from `x`, with the apex so far, to its end; see `integrate`."""
+    step, duration, wind = options.step, options.duration, inputs.wind
     written = min(len(samples), 1)
-    s, t = p.state, p.k * step
+    s, t = x.state, x.steps * step
     landed = False
     while t < duration and not landed:
-        s, g = p.state, p.gust
+        s, gust = x.state, x.gust
         h = step
-        next_t = (p.k + 1) * step
+        next_t = (x.steps + 1) * step
         if next_t > duration - 1e-9 * step:
             if next_t > duration + 1e-9 * step:
                 h = duration - t
             next_t = duration
-        p = advance(p, h, plant, table, spin_terms, control, wind, noise, step)
-        next_s, next_g = p.state, p.gust
+        x = advance(x, h, step, plant, inputs)
+        next_s, next_gust = x.state, x.gust
         if not is_sound(next_s, step, plant):
-            return Ended(LOST, t, s, apex_Z, written)
-        landed = ground and next_s.Z > 0.0
+            return IntegrationResult(LOST, t, s, apex_Z, written)
+        landed = options.ground and next_s.Z > 0.0
         if landed:
-            h, next_g, next_s = touchdown(
-                s, h, next_s, g, next_g, wind, plant, table, spin_terms, control
-            )
+            h, next_gust, next_s = touchdown(s, h, next_s, gust, next_gust, plant, inputs)
             next_t = t + h
 
-        while written < len(samples) and written / sample_rate <= next_t + 1e-12:
-            x = written / sample_rate - t
-            if x < h * (1.0 - 1e-9):
-                x_g = lerp(g, next_g, x / h)
-                x_s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
-                _write(samples[written], written / sample_rate, x_s, wind_at(x_s.Z, x_g, wind))
+        while written < len(samples) and written / options.sample_rate <= next_t + 1e-12:
+            sample_t = written / options.sample_rate
+            d = sample_t - t
+            if d < h * (1.0 - 1e-9):
+                d_gust = lerp(gust, next_gust, d / h)
+                d_s = rk4_step(s, d, gust, d_gust, plant, inputs)
+                _write_sample(samples[written], sample_t, d_s, wind_at(d_s.Z, d_gust, wind))
             else:
-                z_wind = wind_at(next_s.Z, next_g, wind)
-                _write(samples[written], written / sample_rate, next_s, z_wind)
+                here = wind_at(next_s.Z, next_gust, wind)
+                _write_sample(samples[written], sample_t, next_s, here)
             written += 1
         if s.VZ < 0.0 <= next_s.VZ:
             apex_Z = min(apex_Z, top(s, next_s, h))
         apex_Z = min(apex_Z, next_s.Z)
         s, t = next_s, next_t
-    return Ended(LANDED if landed else FLYING, t, s, apex_Z, written)
+    return IntegrationResult(LANDED if landed else FLYING, t, s, apex_Z, written)
 
 
 @inline
@@ -220,7 +176,7 @@ def _airspeed(s: State, wind: Velocity) -> float:
 
 
 @inline
-def _write(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
+def _write_sample(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
     row[0] = t
     for i in range(len(s)):
         row[1 + i] = s[i]
@@ -229,97 +185,94 @@ def _write(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
     row[-1] = wind.Z
 
 
-PROGRESS_SIZE = 1 + STATE_SIZE + 3 + 5 + 3 + 3 + 1
+INTEGRATOR_STATE_SIZE = 1 + STATE_SIZE + 3 + 5 + 3 + 3 + 1
 
 
 @entry
-def run(
+def advance_steps(
     flight: FloatArray,
     steps: int,
     plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
     control: Control,
     wind: WindData,
     noise: FloatArray,
     step: float,
     ground: bool,
-    touch: FloatArray,
+    landing: FloatArray,
 ) -> tuple[int, float]:
-    """Fly some whole `steps` on, or to the ground; see `integrate` for the other arguments.
+    """Advance a flight by some whole steps, or to the ground.
 
-    Arrays, because named tuples cost Python more than a step costs the machine.
+    The node calls this for each step, and a call costs more than the step: 3.4 us to hand over
+    named tuples from Python, 4.2 us if control, wind and noise were made `Inputs` each time. So
+    these are separate arguments, and the flight is an array.
 
     Args:
-        flight: A `Progress` in the order of its fields, shape (PROGRESS_SIZE,): the flight so far,
-            left as it is after the last whole step that is sound and above the ground. Of
-            one at its release, k = 0, only the state counts.
-        steps: Whole steps to make.
+        flight: An `IntegratorState` in the order of its fields, shape (INTEGRATOR_STATE_SIZE,).
+            Updated to the last whole step that is sound and above the ground. Of a flight at its
+            release, with 0 steps done, only the state counts.
+        steps: Number of steps.
         plant: Constants of the flight.
-        table: Steady coefficients.
-        spin_terms: Coefficients that the spin causes.
         control: Control inputs, held.
         wind: Wind of the flight.
-        noise: Normal numbers that draw the gusts.
+        noise: Gust noise, see `Inputs`.
         step: Integration step [s].
         ground: End where Z = 0 is crossed from above.
-        touch: Filled with the state at the landing, shape (14,).
+        landing: Filled with the state at the landing, shape (14,).
 
     Returns:
         FLYING (all steps done), LANDED or LOST, and the time since the release [s].
     """
-    p = _unpacked(flight)
-    if p.k == 0:
-        p = begin(p.state, plant, table, spin_terms, control, wind, noise)
+    inputs = Inputs(control, wind, noise)
+    x = _unpacked(flight)
+    if x.steps == 0:
+        x = initialise(x.state, plant, inputs)
     status = FLYING
-    t = (p.k + steps) * step
+    t = (x.steps + steps) * step
     for _ in range(steps):
-        after = advance(p, step, plant, table, spin_terms, control, wind, noise, step)
-        s, g = p.state, p.gust
+        after = advance(x, step, step, plant, inputs)
         if not is_sound(after.state, step, plant):
             status = LOST
-            t = p.k * step
+            t = x.steps * step
             break
         if ground and after.state.Z > 0.0:
-            end, next_g = after.state, after.gust
-            x, _, s = touchdown(s, step, end, g, next_g, wind, plant, table, spin_terms, control)
+            h, _, s = touchdown(x.state, step, after.state, x.gust, after.gust, plant, inputs)
             for i in range(STATE_SIZE):
-                touch[i] = s[i]
+                landing[i] = s[i]
             status = LANDED
-            t = p.k * step + x
+            t = x.steps * step + h
             break
-        p = after
-    _pack(p, flight)
+        x = after
+    _pack(x, flight)
     return status, t
 
 
 @inline
-def _unpacked(a: FloatArray) -> Progress:
+def _unpacked(a: FloatArray) -> IntegratorState:
     s = State(
         a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13], a[14]
     )
     gust = Velocity(a[15], a[16], a[17])
     filters = GustFilter(a[18], a[19], a[20], a[21], a[22])
-    drawn, next_drawn = Velocity(a[23], a[24], a[25]), Velocity(a[26], a[27], a[28])
-    return Progress(int(a[0]), s, gust, filters, drawn, next_drawn, int(a[29]))
+    start_gust, end_gust = Velocity(a[23], a[24], a[25]), Velocity(a[26], a[27], a[28])
+    return IntegratorState(int(a[0]), s, gust, filters, start_gust, end_gust, int(a[29]))
 
 
 @inline
-def _pack(p: Progress, a: FloatArray) -> None:
-    a[0] = p.k
+def _pack(x: IntegratorState, a: FloatArray) -> None:
+    a[0] = x.steps
     for i in range(STATE_SIZE):
-        a[1 + i] = p.state[i]
+        a[1 + i] = x.state[i]
     for i in range(3):
-        a[15 + i] = p.gust[i]
-        a[23 + i] = p.drawn[i]
-        a[26 + i] = p.next_drawn[i]
+        a[15 + i] = x.gust[i]
+        a[23 + i] = x.start_gust[i]
+        a[26 + i] = x.end_gust[i]
     for i in range(5):
-        a[18 + i] = p.filters[i]
-    a[29] = p.interval
+        a[18 + i] = x.filters[i]
+    a[29] = x.interval
 
 
-class Observed(NamedTuple):
-    """Rates of change of a flight, and the aerodynamic loads behind them."""
+class Observation(NamedTuple):
+    """Rates of change in a flight, and the aerodynamic loads that cause them."""
 
     VX_dot: float  # acceleration of the centre, earth axes 1 [m/s^2]
     VY_dot: float
@@ -337,26 +290,20 @@ class Observed(NamedTuple):
 
 @entry
 def observe(
-    flight: FloatArray,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
-    wind: WindData,
-    seen: FloatArray,
+    flight: FloatArray, plant: Plant, control: Control, wind: WindData, observation: FloatArray
 ) -> None:
-    """Fill `seen` with an `Observed` of a flight as `run` left it, shape (12,)."""
-    p = _unpacked(flight)
-    s = p.state
-    here = wind_at(s.Z, p.gust, wind)
-    d = derivative(s, here, plant, table, spin_terms, control)
+    """Fill an array of shape (12,) with the `Observation` of a flight from `advance_steps`."""
+    x = _unpacked(flight)
+    s = x.state
+    here = wind_at(s.Z, x.gust, wind)
+    d = derivative(s, here, plant, control)
     a = flow(s, here)
-    C = coefficients(a, s.r, plant, table, spin_terms)
+    C = coefficients(a, s.r, plant)
     X, Y, Z = force(a, C, plant)
     only_air = Control(control.C_L, control.C_M, control.C_N, 0.0, 0.0, 0.0, control.axes)
     m = moment(a, s, C, plant, only_air)
     L = m.L + m.D_xx * s.p + m.D_xy * s.q
     M = m.M + m.D_xy * s.p + m.D_yy * s.q
-    found = (d.VX, d.VY, d.VZ, d.p, d.q, d.r, X, Y, Z, L, M, m.N)
-    for i in range(len(found)):
-        seen[i] = found[i]
+    fields = (d.VX, d.VY, d.VZ, d.p, d.q, d.r, X, Y, Z, L, M, m.N)
+    for i in range(len(fields)):
+        observation[i] = fields[i]

@@ -1,6 +1,7 @@
-"""One fixed step of the classic Runge-Kutta method, shared by every flight."""
+"""One step of the classic Runge-Kutta method, and where a step crosses the ground."""
 
 import math
+from typing import NamedTuple
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.kernels.equations import (
@@ -18,32 +19,39 @@ from disc_sim_ros.physics.kernels.wind import WindData, wind_at
 STABLE = 2.78  # largest step times rate, of a decay or an oscillation, that stays bounded
 
 
+class Inputs(NamedTuple):
+    """What acts on a flight: held control inputs, the wind, and the noise that draws its gusts."""
+
+    control: Control
+    wind: WindData
+    noise: FloatArray  # standard normal, shape (n, 5), a row for each drawn gust; (0, 5): no gusts
+
+
 @jit
 def rk4_step(
-    s: State,
-    h: float,
-    gust: Velocity,
-    next_gust: Velocity,
-    wind: WindData,
-    plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
+    s: State, h: float, gust: Velocity, next_gust: Velocity, plant: Plant, inputs: Inputs
 ) -> State:
-    """Return the state after `h`, while the gust goes straight from `gust` to `next_gust`.
+    """Return the state after a step, during which the gust changes linearly.
 
-    See `equations.derivative` for the other arguments.
+    Args:
+        s: State; its quaternion has unit length.
+        h: Length of the step [s].
+        gust: Gust at the beginning of the step.
+        next_gust: Gust at its end.
+        plant: Constants of the flight.
+        inputs: Control inputs and wind.
     """
+    control, wind = inputs.control, inputs.wind
     x, g = s, gust
     sum_k = axpy(s, -1.0, s)  # zeros
     for stage in range(4):  # one loop: the equations are compiled into one place
-        k = derivative(x, wind_at(x.Z, g, wind), plant, table, spin_terms, control)
+        k = derivative(x, wind_at(x.Z, g, wind), plant, control)
         sum_k = axpy(sum_k, 2.0 if 0 < stage < 3 else 1.0, k)
         a = 0.5 if stage < 2 else 1.0
         g = lerp(gust, next_gust, a)
         x = axpy(s, a * h, k)
     s = axpy(s, h / 6.0, sum_k)
-    return consistent(s, wind_at(s.Z, next_gust, wind), plant, table, spin_terms, control)
+    return consistent(s, wind_at(s.Z, next_gust, wind), plant, control)
 
 
 @inline
@@ -75,7 +83,7 @@ def axpy(s: State, h: float, k: State) -> State:
 
 @inline
 def is_sound(s: State, h: float, plant: Plant) -> bool:
-    """Say whether the state is finite, and turns slowly enough for steps of `h` to follow."""
+    """Return True if the state is finite, and turns slowly enough for steps of `h` [s]."""
     total = s.X + s.Y + s.Z + s.VX + s.VY + s.VZ + s.e0 + s.e1 + s.e2 + s.e3
     fastest = max(abs(s.p), abs(s.q), abs(s.r))
     if plant.model != PRECESSION:
@@ -83,7 +91,7 @@ def is_sound(s: State, h: float, plant: Plant) -> bool:
     return (abs(total + s.sigma) < math.inf) & (fastest * h <= STABLE)
 
 
-_TOLERANCE = 1e-12  # s; a thousandth of what is promised
+_TOLERANCE = 1e-12  # s; a thousandth of the promised 1e-9 s
 
 
 @jit
@@ -91,26 +99,35 @@ def touchdown(
     s: State,
     h: float,
     end: State,
-    g: Velocity,
-    next_g: Velocity,
-    wind: WindData,
+    gust: Velocity,
+    next_gust: Velocity,
     plant: Plant,
-    table: FloatArray,
-    spin_terms: FloatArray,
-    control: Control,
+    inputs: Inputs,
 ) -> tuple[float, Velocity, State]:
-    """Return when Z = 0 within a step to `end`, below the ground, and gust and state there.
+    """Find where a step crosses the ground, Z = 0.
 
-    Newton's method on shorter steps from `s`, from where a cubic through both ends is 0, and
-    halving where it leads away. A release on the ground is not a landing if the disc rises first:
-    then the way back counts.
+    Newton's method on the length of a shorter step from `s`. It starts at the root of the cubic
+    through both ends, and bisects where an iterate leaves the bracket. A release on the ground is
+    a landing at once, unless the disc rises first.
+
+    Args:
+        s: State at the beginning of the step.
+        h: Length of the step [s].
+        end: State at its end, below the ground.
+        gust: Gust at the beginning of the step.
+        next_gust: Gust at its end.
+        plant: Constants of the flight.
+        inputs: Control inputs and wind.
+
+    Returns:
+        Time from the beginning of the step [s], and gust and state then.
     """
     a, b = 0.0, h
     if s.Z >= 0.0:
         a = 1e-6 * h
-        a_g = lerp(g, next_g, a / h)
-        if rk4_step(s, a, g, a_g, wind, plant, table, spin_terms, control).Z >= 0.0:
-            return 0.0, g, s
+        a_gust = lerp(gust, next_gust, a / h)
+        if rk4_step(s, a, gust, a_gust, plant, inputs).Z >= 0.0:
+            return 0.0, gust, s
     f = s.Z / (s.Z - end.Z)
     for _ in range(3):
         Z, slope, _ = cubic(s, end, h, f)
@@ -118,8 +135,8 @@ def touchdown(
     next_x = f * h
     for _ in range(100):
         x = next_x if a < next_x < b else 0.5 * (a + b)
-        x_g = lerp(g, next_g, x / h)
-        x_s = rk4_step(s, x, g, x_g, wind, plant, table, spin_terms, control)
+        x_gust = lerp(gust, next_gust, x / h)
+        x_s = rk4_step(s, x, gust, x_gust, plant, inputs)
         next_x = x - x_s.Z / x_s.VZ if x_s.VZ != 0.0 else a
         if x_s.Z == 0.0 or abs(next_x - x) < _TOLERANCE or b - a < _TOLERANCE:
             break
@@ -127,12 +144,12 @@ def touchdown(
             b = x
         else:
             a = x
-    return x, x_g, x_s
+    return x, x_gust, x_s
 
 
 @inline
 def cubic(s: State, end: State, h: float, f: float) -> tuple[float, float, float]:
-    """Return Z and two derivatives by `f`, the fraction of a step, on the cubic of its ends."""
+    """Return Z and its two derivatives at the fraction `f` of a step, on the cubic of its ends."""
     rise, start, stop = end.Z - s.Z, h * s.VZ, h * end.VZ
     c2 = 3.0 * rise - 2.0 * start - stop
     c3 = start + stop - 2.0 * rise
@@ -142,7 +159,7 @@ def cubic(s: State, end: State, h: float, f: float) -> tuple[float, float, float
 
 @inline
 def top(s: State, end: State, h: float) -> float:
-    """Return the least Z (down) of a step in which VZ turns from up to down."""
+    """Return the least Z (down) in a step in which VZ changes from up to down."""
     f = s.VZ / (s.VZ - end.VZ)
     _, slope, curvature = cubic(s, end, h, f)
     Z, _, _ = cubic(s, end, h, f - slope / curvature)

@@ -1,17 +1,19 @@
-"""Placeholder."""
+"""Rotations as plain arithmetic, for Python and for the compiled equations alike."""
 
 import math
 from typing import Any
 
 from disc_sim_ros.arrays import Vector
+from disc_sim_ros.physics.kernels.jit import inline
 
 Quaternion = tuple[float, float, float, float]
 
 
+@inline
 def quaternion_of_half_angles(
     cphi: float, sphi: float, cthe: float, sthe: float, cpsi: float, spsi: float
 ) -> Quaternion:
-    """Return `quaternion_from_euler` from cosine and sine of the halves of its angles."""
+    """Return (e0, e1, e2, e3) from cosine and sine of half the roll, pitch and yaw angles."""
     return (
         cphi * cthe * cpsi + sphi * sthe * spsi,
         sphi * cthe * cpsi - cphi * sthe * spsi,
@@ -20,11 +22,12 @@ def quaternion_of_half_angles(
     )
 
 
+@inline
 def rotation_elements(e0: Any, e1: Any, e2: Any, e3: Any) -> tuple[Any, ...]:
     """Return the nine elements, row by row, of the matrix that takes body to earth components.
 
-    For floats or arrays, and compiled into the equations of motion. The third column is the
-    disc's z axis in axes 1. Source: transpose of paper eqn 2, corrected (docs/deviations.md).
+    For floats and for arrays. The third column is the disc's z axis in axes 1.
+    Source: transpose of paper eqn 2, corrected (docs/deviations.md).
     """
     return (
         1 - 2 * (e2 * e2 + e3 * e3),
@@ -39,6 +42,7 @@ def rotation_elements(e0: Any, e1: Any, e2: Any, e3: Any) -> tuple[Any, ...]:
     )
 
 
+@inline
 def rotated(elements: tuple[float, ...], vector: Vector) -> Vector:
     """Return the product of a matrix, given by its elements row by row, and a vector."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = elements
@@ -46,10 +50,12 @@ def rotated(elements: tuple[float, ...], vector: Vector) -> Vector:
     return xx * u + xy * v + xz * w, yx * u + yy * v + yz * w, zx * u + zy * v + zz * w
 
 
+@inline
 def cos_sin_degrees(angle: float) -> tuple[float, float]:
     """Return cosine and sine of an angle in degrees, exact at multiples of 90 degrees.
 
-    The sine of the opposite angle is the opposite to the last bit, so that mirrored launches are.
+    The sine of the opposite angle is the exact opposite, so that mirrored launches give mirrored
+    flights.
     """
     quarter, rest = divmod(abs(angle), 90.0)
     c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))

@@ -1,22 +1,20 @@
-"""One source of the equations, for one disc or for WIDTH of them side by side.
+"""One source of the equations, for one disc or for WIDTH discs in SIMD registers.
 
-Compiled functions take lanes, vectors of WIDTH floats, wherever they take a float: `+ - * /`,
-comparisons, `min`, `max`, `abs`, `math.sqrt` and the functions below act on all lanes at once,
-each lane rounded as that float alone would be. So both give the same bits. What does not act on
-lanes is `if`: in its place stands `where` and, around what is seldom needed, `if any_of(...)`.
+A compiled function takes a SIMD vector, one float in each of WIDTH lanes, wherever it takes a
+float. `+ - * /`, comparisons, `min`, `max`, `abs`, `math.sqrt` and the functions below act on all
+lanes at once, and each lane is rounded as a single float is: both give the same bits. `if` does
+not act on lanes. Use `where` in its place and, around rare work, `if any_of(...)`.
+
+These are the functions that plain Python runs. `simd_numba` tells numba how to compile them, for
+floats and for vectors.
 """
 
 import math
-import operator
 from typing import Any
 
-from numba.extending import overload
-
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.kernels import simd_intrinsics
-from disc_sim_ros.physics.kernels.simd_intrinsics import BOOLEAN, FLOAT, LANES, MASK, WIDTH, define
 
-__all__ = ['WIDTH', 'any_of', 'at', 'element', 'floor', 'store', 'table_row', 'where']
+WIDTH = 8  # lanes; a multiple of 8
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
@@ -25,7 +23,7 @@ def where(condition: Any, a: Any, b: Any) -> Any:
 
 
 def any_of(condition: Any) -> bool:
-    """Say whether the condition holds in any lane."""
+    """Return True if the condition holds in any lane."""
     return bool(condition)
 
 
@@ -35,13 +33,13 @@ def floor(x: Any) -> Any:
 
 
 def element(row: FloatArray, j: int) -> Any:
-    """Return element `j` of an array of shape (n,); of shape (n, WIDTH), the lanes of its row."""
+    """Return element `j` of an array of shape (n,), or row `j` of shape (n, WIDTH) as a vector."""
     return row[j]
 
 
-def store(array: FloatArray, i: int, lanes: Any) -> None:
-    """Write lanes to row `i` of an array of shape (n, WIDTH)."""
-    array[i] = lanes
+def store(array: FloatArray, i: int, vector: Any) -> None:
+    """Write a vector to row `i` of an array of shape (n, WIDTH)."""
+    array[i] = vector
 
 
 def at(table: FloatArray, i: Any, j: Any) -> Any:
@@ -52,71 +50,7 @@ def at(table: FloatArray, i: Any, j: Any) -> Any:
 def table_row(table: FloatArray, i: Any) -> tuple[Any, ...]:
     """Return row `i`, a whole float, of an array of shape (n, 8).
 
-    For lanes, the row of each lane's own table; these stand side by side, shape (n, 8 WIDTH).
+    For a vector `i`, each lane has a table of its own; shape (n, 8 WIDTH), side by side.
     """
     r = table[int(i)]
     return r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]
-
-
-for _function in (operator.add, operator.iadd):
-    define(_function, LANES, (LANES, LANES), lambda builder, x, y: builder.fadd(x, y))
-define(operator.sub, LANES, (LANES, LANES), lambda builder, x, y: builder.fsub(x, y))
-define(operator.mul, LANES, (LANES, LANES), lambda builder, x, y: builder.fmul(x, y))
-define(operator.truediv, LANES, (LANES, LANES), lambda builder, x, y: builder.fdiv(x, y))
-define(operator.neg, LANES, (LANES,), lambda builder, x: builder.fneg(x))
-define(abs, LANES, (LANES,), simd_intrinsics.call('fabs'))
-define(math.sqrt, LANES, (LANES,), simd_intrinsics.call('sqrt'))
-for _count in (2, 3):
-    define(max, LANES, (LANES,) * _count, simd_intrinsics.extreme('>'))
-    define(min, LANES, (LANES,) * _count, simd_intrinsics.extreme('<'))
-for _function, _symbol in (
-    (operator.lt, '<'),
-    (operator.le, '<='),
-    (operator.gt, '>'),
-    (operator.ge, '>='),
-):
-    define(
-        _function,
-        MASK,
-        (LANES, LANES),
-        lambda builder, x, y, symbol=_symbol: builder.fcmp_ordered(symbol, x, y),
-    )
-define(operator.and_, MASK, (MASK, MASK), lambda builder, x, y: builder.and_(x, y))
-define(operator.or_, MASK, (MASK, MASK), lambda builder, x, y: builder.or_(x, y))
-define(any_of, BOOLEAN, (MASK,), simd_intrinsics.any_bit)
-define(any_of, BOOLEAN, (BOOLEAN,), lambda _builder, condition: condition)
-for _kind, _condition in ((FLOAT, BOOLEAN), (LANES, MASK)):
-    define(floor, _kind, (_kind,), simd_intrinsics.call('floor'))
-    define(
-        where,
-        _kind,
-        (_condition, _kind, _kind),
-        lambda builder, condition, a, b: builder.select(condition, a, b),
-    )
-
-
-# Numba takes Python functions here, so that lambdas stand around its intrinsics.
-@overload(element, strict=False)  # type: ignore[untyped-decorator]
-def _element(row: Any, j: Any) -> Any:
-    if row.ndim == 2:
-        return lambda row, j: simd_intrinsics.load(row, j)  # noqa: PLW0108
-    return lambda row, j: row[j]
-
-
-@overload(store, strict=False)  # type: ignore[untyped-decorator]
-def _store(array: Any, i: Any, lanes: Any) -> Any:
-    return lambda array, i, lanes: simd_intrinsics.store(array, i, lanes)  # noqa: PLW0108
-
-
-@overload(at, strict=False)  # type: ignore[untyped-decorator]
-def _at(table: Any, i: Any, j: Any) -> Any:
-    if LANES in {i, j}:
-        return lambda table, i, j: simd_intrinsics.pick(table, i, j)  # noqa: PLW0108
-    return at
-
-
-@overload(table_row, strict=False)  # type: ignore[untyped-decorator]
-def _table_row(table: Any, i: Any) -> Any:
-    if i == LANES:
-        return lambda table, i: simd_intrinsics.pick_row(table, i)  # noqa: PLW0108
-    return table_row

@@ -1,9 +1,9 @@
 """Wind at a point: mean, log profile, and Dryden gusts of MIL-F-8785C for low altitude.
 
-Gusts are drawn on a time grid of their own, from noise that is given, and are straight lines in
-between: the integration step does not choose the gusts, and the same noise gives the same flight.
-Length scales and strengths follow MIL-F-8785C, section 3.7.3.4, for heights below 1000 ft, with
-the height held at 10 ft below that, where the specification ends.
+Gusts are drawn from given noise on a time grid of their own, and are linear in between: they do
+not depend on the integration step, and the same noise gives the same flight. Length scales and
+strengths follow MIL-F-8785C, section 3.7.3.4, for heights below 1000 ft. Below 10 ft, where the
+specification ends, they are those at 10 ft.
 """
 
 import math
@@ -21,7 +21,7 @@ _SQRT3 = math.sqrt(3.0)
 
 
 class WindData(NamedTuple):
-    """Wind of a flight as the compiled equations take it, earth axes 1; see `environment.Wind`."""
+    """Wind in the form of the compiled equations, earth axes 1; see `environment.Wind`."""
 
     X: float  # m/s
     Y: float
@@ -45,7 +45,7 @@ class GustFilter(NamedTuple):
 
 @inline
 def wind_at(Z: float, gust: Velocity, wind: WindData) -> Velocity:
-    """Return the wind with its gust at Z (down)."""
+    """Return the velocity of the air at Z (down), for the gust there."""
     share = 1.0
     if wind.z0 > 0.0:
         share = math.log(max(-Z / wind.z0, 1.0)) * wind.per_log
@@ -54,7 +54,7 @@ def wind_at(Z: float, gust: Velocity, wind: WindData) -> Velocity:
 
 @inline
 def first_filter(n: FloatArray) -> GustFilter:
-    """Return a filter state drawn from its steady distribution with five normal numbers."""
+    """Return a filter state drawn from the stationary distribution with five normal numbers."""
     return GustFilter(
         n[0],
         n[1] * math.sqrt(0.5),
@@ -77,7 +77,7 @@ def next_filter(f: GustFilter, V: float, Z: float, dt: float, n: FloatArray) -> 
 
 @inline
 def gust_of(f: GustFilter, Z: float, wind: WindData) -> Velocity:
-    """Return the gust velocity that belongs to a filter state at height `-Z`."""
+    """Return the gust velocity of a filter state at height `-Z`."""
     _, _, sigma, sigma_w = scales(Z, wind.W_20)
     u = sigma * f.u
     v = sigma * (_SQRT3 * f.v1 + (1.0 - _SQRT3) * f.v2)
@@ -99,7 +99,7 @@ def _next_pair(x1: float, x2: float, d: float, n1: float, n2: float) -> tuple[fl
     """Return the two states of (1 + sqrt(3) T s) / (1 + T s)^2 after d = dt / T.
 
     x1' = (noise - x1) / T, x2' = (x1 - x2) / T; the output sqrt(3) x1 + (1 - sqrt(3)) x2 has unit
-    variance. The noise has the covariance that keeps the steady one, (2, 1; 1, 1) / 4.
+    variance. The noise has the covariance that keeps the stationary one, (2, 1; 1, 1) / 4.
     """
     a = math.exp(-d)
     y1 = a * x1

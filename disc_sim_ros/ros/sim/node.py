@@ -119,10 +119,8 @@ def main(args: Sequence[str] | None = None) -> int:
         The exit code: 0, 1 if the simulation broke down, 2 for bad arguments or parameters.
     """
     exit_on_signal()  # also while compiling
-    if not simulator.is_ready():
-        sys.stderr.write(
-            'sim_node: compiling the equations of motion, once on this machine, about 10 s\n'
-        )
+    if text := simulator.first_call_note():
+        sys.stderr.write(f'sim_node: {text}\n')
     simulator.warm_up()
     return node_main.run('sim_node', SimNode, args)
 
