@@ -1,12 +1,13 @@
 """Between a topic and the MCAP records that define it: its channel and its schema."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, McapRecord, Schema
 
 from disc_sim_ros.bags import schemas
-from disc_sim_ros.bags.topic import Topic, parse_qos, qos_yaml
+from disc_sim_ros.bags.topic import Qos, Topic, parse_qos, qos_yaml
 from disc_sim_ros.errors import BagError
 
 _QOS = 'offered_qos_profiles'
@@ -45,6 +46,13 @@ def channel_of(topic: Topic, channel_id: int, schema_id: int) -> Channel:
         metadata={_QOS: qos_yaml(topic.qos), _HASH: topic.type_hash},
         schema_id=schema_id,
     )
+
+
+def with_qos(channel: Channel, profiles: Sequence[Qos]) -> Channel:
+    """Return a channel that has these profiles; the same one where it has them already."""
+    if topic_of(channel, None).qos == tuple(profiles):
+        return channel
+    return replace(channel, metadata={**channel.metadata, _QOS: qos_yaml(profiles)})
 
 
 def schema_of(topic: Topic, schema_id: int) -> Schema:

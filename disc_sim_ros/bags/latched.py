@@ -11,6 +11,8 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from disc_sim_ros.bags.definitions import Definition
+from disc_sim_ros.bags.mcap_writer import McapFile
 from disc_sim_ros.bags.topic import Topic
 
 RECORD = 'disc_sim_ros/repeated_messages'  # name of the MCAP metadata record
@@ -48,11 +50,37 @@ class LatchedMessages:
             before: Iterable[Kept] = self.by_topic.get(topic_id, ())
             self.by_topic[topic_id] = deque(before, maxlen=min(depth, MOST))
 
-    def to_repeat(self, max_size: float) -> list[tuple[int, Kept]]:
-        """Return topic ids and messages to repeat, in a file of a largest size [bytes].
+    def repeat(
+        self, file: McapFile, definitions: Mapping[int, Definition], log_time: int, max_size: float
+    ) -> list[int]:
+        """Begin a file with the messages, in a chunk of their own.
 
-        Topics with large messages are left out where the messages would fill the file.
+        Args:
+            file: A new one.
+            definitions: By topic id.
+            log_time: Of the first message to come [ns].
+            max_size: Of the file [bytes].
+
+        Returns:
+            The topic id of each message.
+
+        Raises:
+            OSError: The system refuses; nothing is lost, the messages are in an earlier file.
         """
+        messages = self._to_repeat(max_size)
+        if messages:
+            try:
+                file.add_metadata(RECORD, {LOG_TIME: str(log_time), COUNT: str(len(messages))})
+                for topic_id, m in messages:
+                    file.write(definitions[topic_id], m.data, log_time, m.publish_time, m.sequence)
+                file.end_chunk()
+            except OSError:
+                file.drop_chunk()
+                raise
+        return [topic_id for topic_id, _ in messages]
+
+    def _to_repeat(self, max_size: float) -> list[tuple[int, Kept]]:
+        """Return topic ids and messages; no large ones that would fill a file."""
         room = max_size / _SHARE
         sizes = {i: sum(len(m.data) for m in kept) for i, kept in self.by_topic.items()}
         chosen = set()
@@ -62,11 +90,6 @@ class LatchedMessages:
                 break
             chosen.add(topic_id)
         return [(i, m) for i, kept in self.by_topic.items() if i in chosen for m in kept]
-
-
-def record(log_time: int, count: int) -> dict[str, str]:
-    """Return the content of the metadata record in front of repeated messages."""
-    return {LOG_TIME: str(log_time), COUNT: str(count)}
 
 
 def log_time_of(content: Mapping[str, str]) -> int | None:

@@ -167,6 +167,10 @@ class McapFile:
         self._chunk, self._index = bytearray(), {}
         return dropped
 
+    def defines(self, channel_id: int) -> bool:
+        """Return True if the file or its open chunk has the definition of a channel."""
+        return channel_id in self._defined
+
     def define(self, definitions: Iterable[Definition]) -> None:
         """Write definitions that the file does not have yet, as of topics without messages.
 

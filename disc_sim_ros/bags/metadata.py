@@ -16,6 +16,7 @@ KEY = 'serialized_metadata'
 DISTRO_KEY = 'ROS_DISTRO'  # beside it, in files before version 9
 VERSION = 9
 NO_TIME = 9223372036854775807  # ns, rosbag2's starting time of a bag without messages
+LATE_QOS = 'offered_qos_profiles:'  # begins a key of custom_data, with the name of the topic
 _ROOT = 'rosbag2_bagfile_information'  # of metadata.yaml; the MCAP record has none
 
 

@@ -1,11 +1,12 @@
 """The part of the writer that collects what metadata.yaml reports: topics, files, counts."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+from disc_sim_ros.bags import metadata
 from disc_sim_ros.bags.definitions import Definition, channel_of, schema_of
 from disc_sim_ros.bags.mcap_writer import McapFile
 from disc_sim_ros.bags.metadata import BagMetadata, FileInfo, TopicInfo
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Topic, qos_yaml
 
 
 class MetadataBuilder:
@@ -22,6 +23,14 @@ class MetadataBuilder:
         self._repeats: dict[int, int] = {}  # messages written a second time, by topic
         self._schema_ids: dict[tuple[str, str, bytes], int] = {}  # by name, encoding, data
         self._ros_distro = ros_distro
+
+    def note_late_qos(self, topic: Topic) -> None:
+        """Keep the QoS of publishers that came when the channel was written already.
+
+        The channel and the entry in metadata.yaml stay as they are and agree: rosbags leaves out
+        the messages of a channel whose profiles are not those of metadata.yaml.
+        """
+        self.custom_data[metadata.LATE_QOS + topic.name] = qos_yaml(topic.qos)
 
     def set_topic(self, topic_id: int, topic: Topic) -> Definition:
         """Add a topic or replace its description; return its MCAP records."""
@@ -41,9 +50,10 @@ class MetadataBuilder:
         for topic_id, count in file.counts.items():
             self._closed_counts[topic_id] = self._closed_counts.get(topic_id, 0) + count
 
-    def count_repeat(self, topic_id: int) -> None:
-        """Note that a message was written again, at the beginning of a file."""
-        self._repeats[topic_id] = self._repeats.get(topic_id, 0) + 1
+    def count_repeats(self, topic_ids: Iterable[int]) -> None:
+        """Note that a message of each topic was written again, at the beginning of a file."""
+        for topic_id in topic_ids:
+            self._repeats[topic_id] = self._repeats.get(topic_id, 0) + 1
 
     def files(self, open_file: McapFile) -> list[FileInfo]:
         """Return all files, the open one last."""
@@ -64,12 +74,13 @@ class MetadataBuilder:
 
     def metadata(self, open_file: McapFile) -> BagMetadata:
         """Return the content of metadata.yaml, with what is written of the open file."""
-        topics: dict[str, TopicInfo] = {}
+        topics: dict[tuple[str, str], TopicInfo] = {}
         for topic_id, topic in self.topics.items():
-            before = topics.get(topic.name)  # of another type or definition
+            key = topic.name, topic.type  # a topic may come with a second type
+            before = topics.get(key)
             count = self._count(topic_id, open_file) + (before.message_count if before else 0)
             first = before.topic if before else topic
-            topics[topic.name] = TopicInfo(topic=first, message_count=count)
+            topics[key] = TopicInfo(topic=first, message_count=count)
         return BagMetadata(
             topics=tuple(topics.values()),
             files=tuple(self.files(open_file)),

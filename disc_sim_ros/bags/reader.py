@@ -7,7 +7,7 @@ from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 import struct
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.records import Attachment
@@ -21,11 +21,9 @@ from disc_sim_ros.bags.mcap_reader import indexed
 from disc_sim_ros.bags.mcap_records import ZSTD_MAGIC, decompress_zstd, messages
 from disc_sim_ros.bags.mcap_recovery import scanned
 from disc_sim_ros.bags.metadata import BagMetadata, TopicInfo
+from disc_sim_ros.bags.topic import Qos, Topic, parse_qos
 from disc_sim_ros.errors import BagError, DamageError
 from disc_sim_ros.files import reason
-
-if TYPE_CHECKING:
-    from disc_sim_ros.bags.topic import Topic
 
 
 class RawMessage(NamedTuple):
@@ -293,9 +291,18 @@ def _topics(contents: Iterable[Contents], about: BagMetadata) -> tuple[TopicInfo
         before = topics.setdefault(info.name, info.topic)
         if not before.type:
             topics[info.name] = before = replace(before, type=info.type)
-        if info.topic.qos and before.qos != info.topic.qos:  # of publishers that came later
-            topics[info.name] = replace(before, qos=info.topic.qos)
+        late = about.custom_data.get(metadata.LATE_QOS + info.name)
+        offered = info.topic.qos if late is None else _profiles(late)
+        if offered and before.qos != offered:  # of publishers that came later
+            topics[info.name] = replace(before, qos=offered)
     return tuple(TopicInfo(topic=t, message_count=counts.get(n, 0)) for n, t in topics.items())
+
+
+def _profiles(text: str) -> tuple[Qos, ...]:
+    try:
+        return parse_qos(text)
+    except BagError:
+        return ()
 
 
 def _decoder(

@@ -1,6 +1,6 @@
 """Writing a bag: a folder that rosbag2, Foxglove and this package read, safe at any moment."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import math
 from pathlib import Path
 import shutil
@@ -10,14 +10,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from disc_sim_ros import files, validation
-from disc_sim_ros.bags import latched, metadata
+from disc_sim_ros.bags.bag_files import BagFiles
 from disc_sim_ros.bags.latched import Kept, LatchedMessages
-from disc_sim_ros.bags.mcap_writer import (
-    CHUNK_SIZE,
-    COMPRESSIONS,
-    McapFile,
-    new_attachment,
-)
+from disc_sim_ros.bags.mcap_writer import CHUNK_SIZE, COMPRESSIONS, new_attachment
 from disc_sim_ros.bags.metadata_builder import MetadataBuilder
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.errors import BagError, WriteError
@@ -28,7 +23,6 @@ if TYPE_CHECKING:
     from disc_sim_ros.bags.definitions import Definition
 
 _MOST_CHANNELS = 65535  # ids are of 16 bits
-_MARGIN = 64 * 1024  # bytes of room kept for the end beside what is counted
 
 
 class BagWriter:
@@ -80,8 +74,6 @@ class BagWriter:
             self._max_duration = round(seconds * 1e9)
         self.folder = files.new_folder('bag', Path(folder))
         self.lost = 0  # messages that a full disk cost
-        self.flushed = 0  # messages that the disk has
-        self._compression = compression
         self._metadata = MetadataBuilder(
             ros_distro, {str(k): str(v) for k, v in custom_data.items()}
         )
@@ -90,24 +82,16 @@ class BagWriter:
         self._kept: dict[int, deque[Kept]] = self._latched.by_topic if self._latched else {}
         self._failure: BagError | None = None
         self._closed = False
-        self._stale = True  # metadata.yaml is behind the files
-        self._text_size = 0  # bytes of the last metadata.yaml
-        self._synced = 0  # bytes of the open file that the disk has
         self._chunk_size = min(CHUNK_SIZE, max(4096, self._max_size / 8))
-        self._reserve = files.Reserve(self.folder)
         self._turn_at = 0.0  # log time at which another file begins [ns]
-        self._due = 0.0  # when to flush, by the monotonic clock [s]
-        self._file: McapFile = None  # type: ignore[assignment]  # until the next line but one
+        self._due = time.monotonic() + self._period  # when to flush [s]
         try:
-            self._open_file()
-            self._flush()
+            self._files = BagFiles(self.folder, compression, self._metadata)
         except OSError as error:
-            self._reserve.release()
-            if self._file is not None:
-                self._file.close()
             shutil.rmtree(self.folder, ignore_errors=True)
             why = files.reason(error)
             raise WriteError(f'{self.folder}: no bag can be written there ({why})', why) from None
+        self._file = self._files.file
 
     def add(self, topic: Topic) -> int:
         """Announce a topic; return the id with which its messages are written."""
@@ -119,12 +103,22 @@ class BagWriter:
         return topic_id
 
     def update(self, topic_id: int, topic: Topic) -> None:
-        """Replace the description of a topic in metadata.yaml and in the files to come."""
+        """Replace the description of a topic.
+
+        Once a file has its channel, only the QoS is kept, in `custom_data`, from where `open_bag`
+        takes it.
+        """
         self._refuse_when_over()
         before = self._metadata.topics.get(topic_id)
         if before is None or (before.name, before.type) != (topic.name, topic.type):
             raise BagError(f'{self.folder}: topic {topic_id} is not {topic.name}')
-        self._set(topic_id, topic)
+        if not self._metadata.closed_files and not self._file.defines(topic_id):
+            self._set(topic_id, topic)
+        elif before.qos != topic.qos:
+            self._metadata.note_late_qos(topic)
+            self._files.stale = True
+        if self._latched:
+            self._latched.set_topic(topic_id, topic)
 
     def write(
         self, topic_id: int, data: bytes, log_time: int, publish_time: int, sequence: int = 0
@@ -183,19 +177,19 @@ class BagWriter:
         if not self._file.message_count + self._file.pending_messages:
             return
         try:
-            self._hold_reserve()
-            self._file.end_chunk()
-            self._finish_file()
-            self._open_file()
-            self._flush()
+            self._files.open_next()
         except OSError as error:
             raise self._failed(error) from None
+        finally:
+            self._file = self._files.file
+        self._turn_at = 0.0
+        self._due = time.monotonic() + self._period
 
     def custom(self, key: str, value: str) -> None:
         """Set a text of `custom_data` in metadata.yaml."""
         if self._metadata.custom_data.get(str(key)) != str(value):
             self._metadata.custom_data[str(key)] = str(value)
-            self._stale = True
+            self._files.stale = True
 
     def attach(
         self,
@@ -249,7 +243,7 @@ class BagWriter:
             except OSError as error:
                 failure = self._failed(error)
         try:
-            self._end_in_reserve()
+            self._files.end()
         except OSError as error:
             why = self._reason(error)
             raise WriteError(
@@ -258,8 +252,7 @@ class BagWriter:
                 why,
             ) from None
         finally:
-            self._file.close()
-            self._reserve.release()
+            self._files.close()
         if failure is not None:
             raise failure
 
@@ -267,6 +260,11 @@ class BagWriter:
     def files(self) -> tuple[Path, ...]:
         """The files, the open one last."""
         return tuple(self.folder / f.path for f in self._metadata.files(self._file))
+
+    @property
+    def flushed(self) -> int:
+        """Messages that the disk has."""
+        return self._files.flushed
 
     @property
     def message_count(self) -> int:
@@ -314,7 +312,7 @@ class BagWriter:
         self._writable[topic_id] = self._metadata.set_topic(topic_id, topic)
         if self._latched:
             self._latched.set_topic(topic_id, topic)
-        self._stale = True
+        self._files.stale = True
 
     def _refuse_when_over(self) -> None:
         if self._failure is not None:
@@ -328,29 +326,18 @@ class BagWriter:
             self.split()
         self._turn_at = log_time + self._max_duration
         if self._latched and self._metadata.closed_files and log_time < 2**64:
-            self._repeat(self._latched.to_repeat(self._max_size), log_time)
-
-    def _repeat(self, messages: Sequence[tuple[int, Kept]], log_time: int) -> None:
-        """Begin the file with messages of before, in a chunk of their own."""
-        if not messages:
-            return
-        try:
-            self._hold_reserve()
-            self._file.add_metadata(latched.RECORD, latched.record(log_time, len(messages)))
-            for topic_id, kept in messages:
-                definition = self._writable[topic_id]
-                self._file.write(definition, kept.data, log_time, kept.publish_time, kept.sequence)
-            self._file.end_chunk()
-        except OSError as error:
-            self._file.drop_chunk()  # they are in an earlier file: nothing is lost
-            raise self._failed(error) from None
-        for topic_id, _ in messages:
-            self._metadata.count_repeat(topic_id)
+            try:
+                self._files.hold_reserve()
+                repeated = self._latched.repeat(
+                    self._file, self._writable, log_time, self._max_size
+                )
+            except OSError as error:
+                raise self._failed(error) from None
+            self._metadata.count_repeats(repeated)
 
     def _end_chunk(self) -> None:
         try:
-            self._hold_reserve()
-            self._file.end_chunk()
+            self._files.end_chunk()
         except OSError as error:
             raise self._failed(error) from None
         self._check_full()
@@ -364,26 +351,8 @@ class BagWriter:
 
     def _flush(self) -> None:
         self._due = time.monotonic() + self._period
-        self._hold_reserve()
-        self._file.end_chunk()
-        if self._file.size > self._synced:
-            self._file.sync()
-            self._synced = self._file.size
-            self.flushed = self._metadata.message_count(self._file)
-            self._stale = True
+        self._files.flush()
         self._check_full()
-        if self._stale:
-            self._write_metadata()
-            self._stale = False
-
-    def _hold_reserve(self) -> None:
-        closing = self._file.closing_size(self._metadata.definitions_size)
-        needed = _MARGIN + closing + 3 * self._text_size
-        if needed > self._reserve.size:
-            try:
-                self._reserve.hold(2 * needed)
-            except OSError:
-                self._reserve.hold(needed)
 
     def _failed(self, error: OSError) -> BagError:
         """Take no more messages; return the error that says why."""
@@ -399,38 +368,3 @@ class BagWriter:
 
     def _reason(self, error: OSError) -> str:
         return files.reason(error) if self.folder.is_dir() else 'the folder has been removed'
-
-    def _open_file(self) -> None:
-        number = len(self._metadata.closed_files) + (self._file is not None)
-        name = f'{self.folder.name}_{number}.mcap'
-        file = McapFile(self.folder / name, self._compression)
-        if self._file is not None:
-            self._metadata.close_file(self._file)
-            self._file.close()
-        self._file = file
-        self._turn_at = 0.0
-        self._synced = 0
-        file.add_metadata(metadata.RECORD, self._record())
-        files.sync_folder(self.folder)
-        self._stale = True
-
-    def _finish_file(self) -> None:
-        if self._file.finished:
-            return
-        self._file.define(self._metadata.definitions.values())  # of topics without messages
-        self._file.add_metadata(metadata.RECORD, self._record())
-        self._file.finish()
-        self._file.sync()
-
-    def _end_in_reserve(self) -> None:
-        self._reserve.release()
-        self._finish_file()
-        self._write_metadata()
-
-    def _record(self) -> dict[str, str]:
-        return metadata.record_of(self._metadata.metadata(self._file))
-
-    def _write_metadata(self) -> None:
-        text = metadata.text_of(self._metadata.metadata(self._file)).encode()
-        self._text_size = len(text)
-        files.write_whole(self.folder / metadata.FILE_NAME, text)

@@ -21,7 +21,7 @@ from disc_sim_ros.bags.mcap_writer import McapFile
 from disc_sim_ros.bags.metadata import BagMetadata
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Qos, Topic, qos_yaml
 from disc_sim_ros.bags.writer import BagWriter
 
 CDR_EMPTY = b'\0\1\0\0\0'
@@ -360,3 +360,19 @@ def test_a_bag_without_a_known_distro_gets_none(tmp_path):
     foreign_file(tmp_path / 'x.mcap', end=False)
     repair(tmp_path / 'x.mcap', tmp_path / 'made')
     assert open_bag(tmp_path / 'made').metadata.ros_distro == ''
+
+
+def test_qos_of_an_old_bag_that_differs_between_metadata_and_files_is_made_one(tmp_path):
+    """Version 0.1 told of publishers that came later in metadata.yaml alone."""
+    old_bag(tmp_path / 'old')
+    path = tmp_path / 'old/metadata.yaml'
+    root = yaml.safe_load(path.read_text(encoding='utf-8'))
+    about = root['rosbag2_bagfile_information']['topics_with_message_count'][0]['topic_metadata']
+    about['offered_qos_profiles'] = yaml.safe_load(qos_yaml([Qos(), Qos(depth=3)]))
+    path.write_text(yaml.safe_dump(root, sort_keys=False), encoding='utf-8')
+    with Reader(tmp_path / 'old') as reader:
+        assert not list(reader.messages())
+    repair(tmp_path / 'old', tmp_path / 'made')
+    with Reader(tmp_path / 'made') as reader:
+        assert sum(1 for _ in reader.messages()) == 10
+    assert open_bag(tmp_path / 'made').topics[0].topic.qos == (Qos(), Qos(depth=3))

@@ -20,6 +20,7 @@ from bags.making import (
     write_bag,
 )
 from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.bags.repair import repair
 from disc_sim_ros.bags.topic import Qos
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import BagError, ConfigError
@@ -124,23 +125,41 @@ def test_write_flushes_by_itself_when_the_period_is_over(tmp_path):
     pytest.fail('nothing was flushed')
 
 
-def test_a_second_publisher_is_told_of_in_metadata(tmp_path):
+def test_a_publisher_that_comes_before_the_first_message_is_in_the_channel(tmp_path):
     first, second = Qos(), Qos(durability='transient_local')
     with BagWriter(tmp_path / 'bag') as bag:
         odom = bag.add(topic('/odom', ODOMETRY, first))
-        bag.write(odom, ODOMETRIES[0], 1, 1)
         bag.flush()
         bag.update(odom, topic('/odom', ODOMETRY, first, second))
-        bag.write(odom, ODOMETRIES[0], 2, 2)
-        with pytest.raises(BagError, match='/other'):
-            bag.update(odom, topic('/other', ODOMETRY))
+        bag.write(odom, ODOMETRIES[0], 1, 1)
     profiles = told_by(tmp_path / 'bag')['topics_with_message_count'][0]['topic_metadata'][
         'offered_qos_profiles'
     ]
     assert [p['durability'] for p in profiles] == ['volatile', 'transient_local']
+    assert open_bag(tmp_path / 'bag/bag_0.mcap').topics[0].topic.qos == (first, second)
+
+
+@pytest.mark.parametrize('split', [True, False])
+def test_a_publisher_that_comes_later_is_kept_where_no_reader_stumbles_over_it(tmp_path, split):
+    """rosbags leaves out the messages of channels whose QoS is not that of metadata.yaml."""
+    first, second = Qos(), Qos(durability='transient_local')
+    with BagWriter(tmp_path / 'bag') as bag:
+        odom = bag.add(topic('/odom', ODOMETRY, first))
+        bag.write(odom, ODOMETRIES[0], 1, 1)
+        if split:
+            bag.split()
+        bag.update(odom, topic('/odom', ODOMETRY, first, second))
+        bag.write(odom, ODOMETRIES[0], 2, 2)
+        with pytest.raises(BagError, match='/other'):
+            bag.update(odom, topic('/other', ODOMETRY))
     [info] = open_bag(tmp_path / 'bag').topics
     assert info.topic.qos == (first, second)
     assert info.message_count == 2
+    repair(tmp_path / 'bag', tmp_path / 'made')
+    for folder in ('bag', 'made'):
+        with Reader(tmp_path / folder) as reader:
+            assert sum(1 for _ in reader.messages()) == 2
+        assert open_bag(tmp_path / folder).topics[0].topic.qos == (first, second)
 
 
 def test_attachments_are_read_back_by_strangers(tmp_path, foxglove):
@@ -161,7 +180,12 @@ def test_messages_of_one_topic_with_two_types_are_both_kept(tmp_path):
     with BagWriter(tmp_path / 'bag') as bag:
         bag.write(bag.add(topic('/x', ODOMETRY)), ODOMETRIES[0], 1, 1)
         bag.write(bag.add(topic('/x', STRING)), text('a'), 2, 2)
-    assert [m.type for m in open_bag(tmp_path / 'bag').messages()] == [ODOMETRY, STRING]
+    repair(tmp_path / 'bag', tmp_path / 'made')
+    for folder in ('bag', 'made'):
+        assert [m.type for m in open_bag(tmp_path / folder).messages()] == [ODOMETRY, STRING]
+        with Reader(tmp_path / folder) as reader:
+            types = [connection.msgtype for connection, _, _ in reader.messages()]
+        assert types == [ODOMETRY, STRING]
 
 
 # ---- refusals ----
