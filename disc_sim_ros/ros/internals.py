@@ -147,14 +147,14 @@ def parameter_overrides(node: Node, names: Iterable[str]) -> dict[str, object]:
 
     Args:
         node: The node.
-        names: Parameters that are not declared yet. Where rclpy does not tell the overrides, each
+        names: Parameters that are not declared yet. Where rclpy does not give the overrides, each
             is declared for a moment with a dynamic type, which takes its override; overrides of
             other names stay unknown then.
     """
     overrides = getattr(node, '_parameter_overrides', None)
     if overrides is not None:
         return {parameter.name: parameter.value for parameter in overrides.values()}
-    found: dict[str, object] = {}
+    overridden: dict[str, object] = {}
     for name in names:
         if node.has_parameter(name):
             continue
@@ -162,8 +162,8 @@ def parameter_overrides(node: Node, names: Iterable[str]) -> dict[str, object]:
         value = node.declare_parameter(name, None, any_type).value
         node.undeclare_parameter(name)
         if value is not None:
-            found[name] = value
-    return found
+            overridden[name] = value
+    return overridden
 
 
 def _take_message_of(subscription: Subscription) -> Callable[..., Taken | None] | None:

@@ -18,7 +18,7 @@ class Delivery:
     keeps messages until the first `/clock`.
 
     Attributes:
-        lock: Held while messages are delivered; whoever calls a method holds it.
+        lock: Held while messages are delivered; callers of the methods hold it.
         clock: The clock of arrivals.
         paused: Whether messages are not recorded.
     """

@@ -141,7 +141,7 @@ class SimLoop(threading.Thread):
         """Fly until asked to end."""
         sim = self._simulation
         configure_thread(sim.config.realtime_priority, self._warn)
-        sim.publish_wind()
+        sim.inputs.publish_wind()
         sim.publish_markers()
         self._publish_step(serve=True)
         self._restart_pacer()

@@ -89,7 +89,7 @@ def _constant_markers(frames: Frames, diameter: float) -> tuple[Marker, ...]:
 
 
 def _disc(frame: str, diameter: float, namespace: str) -> Marker:
-    """Return a disc as coloured sectors with a rim, so that its spin can be seen."""
+    """Return a disc as coloured sectors with a rim, so that its spin is visible."""
     r, h = 0.5 * diameter, 0.5 * RIM_HEIGHT * diameter
     marker = _marker(frame, Marker.TRIANGLE_LIST, namespace)
     marker.scale.x = marker.scale.y = marker.scale.z = 1.0

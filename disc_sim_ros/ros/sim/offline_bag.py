@@ -142,7 +142,7 @@ def _fly(
 
     simulation = Simulation(config, publishers, Commands(None, frames), start, warn)
     coefficients = (control.C_L, control.C_M, control.C_N)
-    simulation.active.set_coefficients(coefficients, inf)
+    simulation.inputs.active.set_coefficients(coefficients, inf)
     messages = floor(duration * config.publish_rate * (1 + 1e-12))
     factory.now = start
     simulation.throw()

@@ -7,26 +7,24 @@ import math
 from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError, IntegrationError
 from disc_sim_ros.physics import frames
-from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight_config import (
     EventKey,
     FlightConfig,
     configuration_text,
     exact_seconds,
 )
-from disc_sim_ros.physics.kernels.equations import DISC_AIR, State, Velocity
+from disc_sim_ros.physics.kernels.equations import State, Velocity
 from disc_sim_ros.physics.simulator import NOTHING, FlightSimulator
 from disc_sim_ros.ros import messages
 from disc_sim_ros.ros.sim import events
 from disc_sim_ros.ros.sim.clock import NANOSECONDS, SimClock
-from disc_sim_ros.ros.sim.commands import ActiveControl, Commands, CommandTopic, pop_due
+from disc_sim_ros.ros.sim.commands import Commands, CommandTopic, pop_due
 from disc_sim_ros.ros.sim.config import SimConfig
 from disc_sim_ros.ros.sim.events import Event
 from disc_sim_ros.ros.sim.imu import ImuErrors
+from disc_sim_ros.ros.sim.inputs import Inputs
 from disc_sim_ros.ros.sim.publishers import Publishers
 
-_NO_MOMENT = (0.0, 0.0, 0.0, DISC_AIR)
-_NO_COEFFICIENTS = (0.0, 0.0, 0.0)
 _AT_ONCE = ('real_time_factor', 'command_timeout', 'throw_period', 'path_rate')
 
 
@@ -46,10 +44,10 @@ class Simulation:
     Attributes:
         clock: Simulated time.
         commands: The command topics.
+        inputs: What acts on the disc.
         counts: Numbers of events so far.
         publishers: The topics that it publishes.
         config: The parameters in force; some of the newest wait for the next throw.
-        active: The control inputs that act at present.
         flight: Number of the last flight since the start or a reset, from 1.
     """
 
@@ -75,9 +73,8 @@ class Simulation:
         self.counts = Counts()
         self.publishers = publishers
         self.config = self._next_config = config
-        self.active = ActiveControl()
+        self.inputs = Inputs(commands, publishers, self.clock, config.setup.wind)
         self._warn = warn
-        self._wind = config.setup.wind
         self._sim: FlightSimulator | None = None
         self._resting = at_rest(config.launch.state())
         self._imu_errors = ImuErrors(config.imu, 0)
@@ -120,8 +117,11 @@ class Simulation:
             The number of steps made.
         """
         clock = self.clock
-        self._apply_changes()
-        change = min(self.commands.next_change(), self.active.next_expiry())
+        if self.inputs.expire(self._sim):
+            self.counts.expired += 1
+            self._publish_event(events.COMMAND_EXPIRED)
+        self.inputs.apply_due(self.config.command_timeout, self._sim)
+        change = self.inputs.next_change()
         n = min(most, self.steps_to_message)
         if change < math.inf:
             n = min(n, max(clock.step_at(int(change)) - clock.steps, 1))
@@ -164,7 +164,7 @@ class Simulation:
         config = self.config
         gusts = config.setup.wind
         wind = replace(
-            self._wind, turbulence=gusts.turbulence, seed=(gusts.seed + self.flight) % 2**63
+            self.inputs.wind, turbulence=gusts.turbulence, seed=(gusts.seed + self.flight) % 2**63
         )
         setup = replace(config.setup, wind=wind)
         state = release or config.launch.state()
@@ -176,7 +176,7 @@ class Simulation:
             self.commands.throw.drop_accepted(str(error))
             self._warn(f'throw dropped: {error}', topics.THROW)
             return
-        sim.take(self.active.control)
+        sim.take(self.inputs.active.control)
         self._sim = sim
         self._imu_errors = ImuErrors(config.imu, self.flight)
         self.flight += 1
@@ -195,8 +195,8 @@ class Simulation:
         )
         text = configuration_text(recorded)
         self.publishers.publish_release(self._released, sim.state, text, setup.disc.diameter)
-        self.publish_wind()
-        self._publish_active_control()
+        self.inputs.publish_wind()
+        self.inputs.publish_control()
         source = 'launch' if release is None else topics.THROW
         self._publish_event(events.thrown(sim.state, self.flight, source))
 
@@ -207,10 +207,7 @@ class Simulation:
         self._resting = at_rest(self.config.launch.state())
         self._throw_at = math.inf
         self.flight = 0
-        self.commands.clear()
-        self._set_moment(_NO_MOMENT, math.inf)
-        self._set_coefficients(_NO_COEFFICIENTS, math.inf)
-        self._set_wind(self.config.setup.wind)
+        self.inputs.reset(self.config.setup.wind)
         self.publishers.clear_path()
         self.publish_markers()
         self._publish_event(events.RESET)
@@ -221,8 +218,9 @@ class Simulation:
         changed = {name: getattr(config, name) for name in _AT_ONCE}
         self.config = replace(self.config, **changed)
         old, new = before.setup.wind, config.setup.wind
+        # A change of gusts alone does not undo a commanded wind.
         if replace(new, turbulence=old.turbulence, seed=old.seed) != old:
-            self._set_wind(new)  # a change of gusts alone does not undo a commanded wind
+            self.inputs.set_wind(new, self._sim)
         if config.throw_period != before.throw_period and self.flight:
             self._throw_at = self._after_period()
 
@@ -246,7 +244,7 @@ class Simulation:
             sim.release, sim.touch, sim.setup.disc.diameter, event.text
         )
 
-    # ---- commands and wind ----
+    # ---- messages ----
 
     def poll(self) -> None:
         """Take the commands that have arrived."""
@@ -255,56 +253,6 @@ class Simulation:
     def _warn_of_drop(self, topic: CommandTopic) -> None:
         self._warn(f'{topic.name} dropped: {topic.reason}', topic.name)
 
-    def _apply_changes(self) -> None:
-        """Let commands and wind begin or end that do so at the present step."""
-        now = self.clock.now
-        until = now + round(self.config.command_timeout * NANOSECONDS)
-        moment_expired, coefficients_expired = self.active.expired(now)
-        if moment_expired:
-            self._set_moment(_NO_MOMENT, math.inf)
-        if coefficients_expired:
-            self._set_coefficients(_NO_COEFFICIENTS, math.inf)
-        if moment_expired or coefficients_expired:
-            self.counts.expired += 1
-            self._publish_event(events.COMMAND_EXPIRED)
-        moment = pop_due(self.commands.moment, now)
-        if moment is not None:
-            self._set_moment(moment, until)
-        coefficients = pop_due(self.commands.coefficients, now)
-        if coefficients is not None:
-            self._set_coefficients(coefficients, until)
-        mean = pop_due(self.commands.wind, now)
-        if mean is not None:
-            self._set_wind(replace(self._wind, mean=mean))
-
-    def _set_moment(self, moment: tuple[float, float, float, int], until: float) -> None:
-        before = self.active.control
-        self.active.set_moment(moment, until)
-        if self.active.control != before:
-            self.publishers.publish_applied_moment(self.clock.now, moment)
-            self._control_disc()
-
-    def _set_coefficients(self, values: tuple[float, float, float], until: float) -> None:
-        before = self.active.control
-        self.active.set_coefficients(values, until)
-        if self.active.control != before:
-            self.publishers.publish_applied_coefficients(self.clock.now, values)
-            self._control_disc()
-
-    def _control_disc(self) -> None:
-        if self._sim is not None:
-            self._sim.take(self.active.control)
-
-    def _set_wind(self, wind: Wind) -> None:
-        """Change mean and profile of the wind now; turbulence and seed wait for the next throw."""
-        self._wind = wind
-        if self._sim is not None:
-            turbulence = self._sim.setup.wind.turbulence
-            self._sim.set_wind(replace(wind, turbulence=turbulence))
-        self.publish_wind()
-
-    # ---- messages ----
-
     def publish(self) -> None:
         """Publish the present state on the topics that have subscribers."""
         out, sim, now = self.publishers, self._sim, self.clock.now
@@ -312,7 +260,7 @@ class Simulation:
         s = self._resting if sim is None else sim.state
         out.publish_motion(now, s)
         if out.quantities_have_subscribers:
-            wind = Velocity(*self._wind.mean) if sim is None else sim.wind
+            wind = Velocity(*self.inputs.wind.mean) if sim is None else sim.wind
             diameter = self.config.setup.disc.diameter
             out.publish_quantities(messages.quantities(s, wind, diameter))
         if out.imu.has_subscribers or out.aero_wrench.has_subscribers:
@@ -330,11 +278,6 @@ class Simulation:
         if self._sample() % max(1, round(self.config.publish_rate / rate)) == 0:
             out.extend_path(now, s)
 
-    def publish_wind(self) -> None:
-        """Publish the mean wind that blows."""
-        mean = frames.map_from_paper(self._wind.mean) + 0.0
-        self.publishers.publish_applied_wind(self.clock.now, mean.tolist())
-
     def publish_markers(self) -> None:
         """Publish the markers of the disc that waits for its throw."""
         self.publishers.publish_markers(self._resting, self.config.setup.disc.diameter)
@@ -343,14 +286,6 @@ class Simulation:
         """Return the number of messages since the release."""
         elapsed = (self.clock.now - self._released) * self.config.publish_rate
         return round(elapsed / NANOSECONDS)
-
-    def _publish_active_control(self) -> None:
-        """Publish the active control again, for a recording that begins with this throw."""
-        c, now = self.active.control, self.clock.now
-        if any((c.L, c.M, c.N)):
-            self.publishers.publish_applied_moment(now, (c.L, c.M, c.N, c.axes))
-        if any((c.C_L, c.C_M, c.C_N)):
-            self.publishers.publish_applied_coefficients(now, (c.C_L, c.C_M, c.C_N))
 
     def _publish_event(self, event: Event) -> None:
         """Publish an event, stamped with the present time unless it has a stamp of its own."""
