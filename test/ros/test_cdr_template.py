@@ -1,4 +1,4 @@
-"""Packed messages are the messages that ROS would serialise, whatever their texts."""
+"""Packed messages are those that ROS serialises, whatever the lengths of their strings."""
 
 import itertools
 
@@ -74,9 +74,9 @@ CASES = {
 
 
 def assert_serialised(cdr, message):
-    """Every byte is that of the real serialiser, or zero where it writes none.
+    """Every byte is that of the serialiser, or zero in padding.
 
-    Where the two differ, anything else may stand without changing what a reader gets.
+    Where the two differ, any other byte deserialises to the same message: it is padding.
     """
     expected = serialize_message(message)
     assert type(cdr) is bytes
@@ -104,45 +104,45 @@ def with_values(message, fields, values, stamps=('header.stamp',)):
 def test_bytes_are_those_of_the_serialiser(make, fields, length):
     message = make(length)
     message.header.frame_id = 'f' * length
-    wire = CdrTemplate(message, fields)
-    for sign in (1.0, -1.0):  # twice: nothing is left over from the first
+    template = CdrTemplate(message, fields)
+    for sign in (1.0, -1.0):  # twice: the second has nothing of the first
         values = [sign * (i + 1) / 3.0 for i in range(len(fields))]
-        cdr = wire.pack(SECONDS, NANOSECONDS, *values)
+        cdr = template.pack(SECONDS, NANOSECONDS, *values)
         assert_serialised(cdr, with_values(message, fields, values))
 
 
 @pytest.mark.parametrize('fields', [*itertools.permutations(('vector.x', 'vector.y', 'vector.z'))])
-def test_values_come_in_the_order_of_the_fields(fields):
+def test_values_are_in_the_order_of_the_fields(fields):
     message = Vector3Stamped()
     cdr = CdrTemplate(message, fields).pack(SECONDS, NANOSECONDS, 1.0, 2.0, 3.0)
     assert_serialised(cdr, with_values(message, fields, (1.0, 2.0, 3.0)))
 
 
 @pytest.mark.parametrize('length', LENGTHS)
-def test_one_time_in_several_places(length):
+def test_several_stamps_get_the_same_time(length):
     stamps = ('header.stamp', 'poses.1.header.stamp')
     message = path(length)
     cdr = CdrTemplate(message, LAST_POSE, stamps).pack(SECONDS, NANOSECONDS, 1.5, 2.5)
     assert_serialised(cdr, with_values(message, LAST_POSE, (1.5, 2.5), stamps))
 
 
-def test_a_message_of_time_alone():
+def test_a_message_of_a_stamp_alone():
     cdr = CdrTemplate(Clock(), (), ('clock',)).pack(SECONDS, NANOSECONDS)
     assert_serialised(cdr, with_values(Clock(), (), (), ('clock',)))
 
 
-def test_a_message_without_time():
+def test_a_message_without_a_stamp():
     assert_serialised(CdrTemplate(Float64(), ('data',), ()).pack(1, 2, -0.1), Float64(data=-0.1))
 
 
-def test_times_before_1970_and_after_all():
-    wire = CdrTemplate(Clock(), (), ('clock',))
-    assert deserialize_message(wire.pack(-1, 999_999_999), Clock).clock.sec == -1
-    assert deserialize_message(wire.pack(2**31 - 1, 0), Clock).clock.sec == 2**31 - 1
+def test_the_first_and_last_times_of_a_stamp():
+    template = CdrTemplate(Clock(), (), ('clock',))
+    assert deserialize_message(template.pack(-1, 999_999_999), Clock).clock.sec == -1
+    assert deserialize_message(template.pack(2**31 - 1, 0), Clock).clock.sec == 2**31 - 1
 
 
-def test_padding_does_not_depend_on_what_the_memory_held():
-    """The serialiser leaves garbage there; zeros make a run the same bytes every time."""
+def test_padding_does_not_depend_on_the_memory():
+    """The serialiser leaves arbitrary bytes there; zeros make each run the same bytes."""
     packed = []
     for garbage in (b'\x55', b'\xff'):
         blocks = [garbage * size for size in range(600, 800)]
@@ -154,7 +154,7 @@ def test_padding_does_not_depend_on_what_the_memory_held():
     assert packed[0][after_text] == 0
 
 
-def test_the_message_given_stays_as_it_is():
+def test_the_given_message_is_not_changed():
     message = odometry(3)
     before = serialize_message(message)
     CdrTemplate(message, messages.ODOMETRY_FIELDS)
@@ -162,7 +162,7 @@ def test_the_message_given_stays_as_it_is():
 
 
 @pytest.mark.parametrize(
-    ('message', 'fields', 'stamps', 'says'),
+    ('message', 'fields', 'stamps', 'pattern'),
     [
         (Odometry(), ('pose.pose.position.w',), ('header.stamp',), 'position.w'),
         (Odometry(), ('child_frame_id',), ('header.stamp',), 'child_frame_id'),
@@ -175,19 +175,19 @@ def test_the_message_given_stays_as_it_is():
         (Float64(), ('',), (), 'Float64 has no field'),
     ],
 )
-def test_fields_that_are_none(message, fields, stamps, says):
-    with pytest.raises(ValueError, match=says):
+def test_a_path_that_is_no_field_is_refused(message, fields, stamps, pattern):
+    with pytest.raises(ValueError, match=pattern):
         CdrTemplate(message, fields, stamps)
 
 
-def test_every_value_is_needed():
+def test_a_missing_or_additional_value_is_refused():
     pack = CdrTemplate(Float64(), ('data',), ()).pack
     for values in ((), (1.0, 2.0)):
         with pytest.raises(TypeError):
             pack(1, 2, *values)
 
 
-def test_these_tests_check_the_types_of_fields():
-    """Or `assign` could set what no message holds, and nobody would see it."""
+def test_messages_check_the_types_of_their_fields():
+    """Otherwise `assign` could set a value that no message holds, and the tests would pass."""
     with pytest.raises(AssertionError):
         Float64(data=3)

@@ -137,11 +137,8 @@ def test_events_report_each_change_once(node, remove, removed):
     assert isinstance(events, internals._ReportedEvents) == (removed == 'EventHandle')
     assert (events.publisher_count(), events.lost(), events.has_incompatible()) == (None, 0, False)
 
-    seen = []
-
     def reported(expected):
-        seen.append(events.publisher_count())
-        return seen[-1] == expected
+        return events.publisher_count() == expected
 
     first = node.create_publisher(Int64, 'count', RELIABLE)
     node.spin_until(lambda: reported(1))
@@ -188,9 +185,9 @@ def test_overrides_of_parameters_are_found_before_they_are_declared(ros_context,
         parameter_overrides=[Parameter(name, value=value) for name, value in overrides.items()],
     )
     assert hasattr(node, '_parameter_overrides') != bool(removed)
-    found = internals.parameter_overrides(node, ['a', 'b', 'not_set'])
+    values = internals.parameter_overrides(node, ['a', 'b', 'not_set'])
     known = {'a', 'b'} if removed else {'a', 'b', 'c'}
-    assert {n: list(v) if n == 'b' else v for n, v in found.items()} == {
+    assert {n: list(v) if n == 'b' else v for n, v in values.items()} == {
         n: overrides[n] for n in known
     }
     assert not any(node.has_parameter(name) for name in (*overrides, 'not_set'))

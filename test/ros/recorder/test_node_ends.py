@@ -1,0 +1,115 @@
+"""recorder_node in its own process: how it ends, and the bag that it leaves."""
+
+from contextlib import contextmanager
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from std_msgs.msg import String
+
+from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.bags.repair import repair
+from ros.recorder_process import Counter, counts
+from ros.sim_process import DEADLINE
+
+pytestmark = pytest.mark.ros
+
+
+def test_a_killed_recorder_costs_at_most_the_last_second(ros, record, tmp_path):
+    recorders = [record() for _ in range(3)]
+    counter = Counter(ros, 'count')
+    for recorder in recorders:
+        recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(3)
+    kill_times = []
+    for recorder in recorders:
+        counter.publish(570, rate=1000.0)
+        recorder.process.kill()
+        kill_times.append(time.monotonic())
+    for recorder, kill_time in zip(recorders, kill_times, strict=True):
+        recorder.wait()
+        recorded = counts(recorder.bag, '/count')
+        assert recorded == list(range(len(recorded)))
+        assert len(recorded) >= sum(sent < kill_time - 1.0 for sent in counter.sent)
+        bag = open_bag(recorder.bag)
+        assert not bag.complete
+        repaired = tmp_path / f'{recorder.bag.name}_repaired'
+        repair(recorder.bag, repaired)
+        assert open_bag(repaired).complete
+        assert counts(repaired, '/count') == recorded
+
+
+def test_files_split_by_duration_hold_everything_after_repeated_signals(ros, record):
+    counter = Counter(ros, 'count')
+    recorder = record(max_duration_s=0.2)
+    recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(1)
+    counter.publish(1000, rate=1000.0)
+    recorder.process.send_signal(signal.SIGINT)
+    recorder.process.send_signal(signal.SIGINT)
+    assert recorder.end(signal.SIGTERM) == 0
+    assert 'Traceback' not in recorder.log
+    assert counts(recorder.bag, '/count') == list(range(1000))
+    assert len(open_bag(recorder.bag).files) >= 4
+
+
+def test_bad_parameters_end_it_with_one_line_before_it_makes_a_folder(record, tmp_path):
+    (tmp_path / 'mine').mkdir()
+    exists = record(tmp_path / 'mine')
+    misspelt = record(max_size=3)
+    for recorder, why in ((exists, 'exists'), (misspelt, 'max_size_mib')):
+        assert recorder.wait() == 2
+        (line,) = recorder.log.splitlines()
+        assert line.startswith('recorder_node: error: ')
+        assert why in line
+    assert list((tmp_path / 'mine').iterdir()) == []
+    assert not misspelt.bag.exists()
+
+
+@contextmanager
+def small_disk(folder, size: str):
+    folder.mkdir()
+    if os.geteuid() != 0:
+        pytest.skip('mounting takes root')
+    mount = ['mount', '-t', 'tmpfs', '-o', f'size={size}', 'tmpfs', str(folder)]
+    if subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip('no file system can be mounted here')
+    try:
+        yield folder
+    finally:
+        subprocess.run(['umount', '-l', str(folder)], check=True)
+
+
+def test_a_full_disk_ends_it_with_a_readable_bag(ros, record, tmp_path):
+    with small_disk(tmp_path / 'disk', '3M') as disk:
+        noise = ros.node.create_publisher(String, 'noise', 1000)
+        recorder = record(disk / 'bag', topics='/noise')
+        recorder.wait_for_topics('/noise')
+        end = time.monotonic() + DEADLINE
+        while recorder.process.poll() is None and time.monotonic() < end:
+            noise.publish(String(data=os.urandom(10_000).hex()))
+            time.sleep(0.002)
+        assert recorder.wait() == 1
+        assert 'No space left' in recorder.log.splitlines()[-1]
+        assert 'Traceback' not in recorder.log
+        bag = open_bag(disk / 'bag')
+        assert bag.complete
+        assert sum(1 for _ in bag.raw()) > 20
+
+
+def test_a_folder_that_is_removed_ends_it_with_a_line(ros, record):
+    counter = Counter(ros, 'count')
+    recorder = record()
+    recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(1)
+    shutil.rmtree(recorder.bag)
+    counter.publish(1000, rate=1000.0)
+    assert recorder.wait() == 1
+    assert 'removed' in recorder.log.splitlines()[-1]
+    assert 'Traceback' not in recorder.log
