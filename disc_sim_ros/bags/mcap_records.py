@@ -7,6 +7,7 @@ known fields is ignored, as the specification demands.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
+import re
 import struct
 from typing import NamedTuple
 import zlib
@@ -28,6 +29,7 @@ _MESSAGE = struct.Struct('<HIQQ')  # channel, sequence, log time, publish time
 _CHUNK = struct.Struct('<QQQI')  # start, end, plain size, checksum
 _CHUNK_FIELDS = 40  # bytes of a chunk record beside the name of its compression and the data
 COMPRESSION_MAGICS = {b'': b'', b'zstd': ZSTD_MAGIC, b'lz4': LZ4_MAGIC}  # of chunks
+_LONGEST_NAME = 16  # bytes of the name of a compression
 _LARGEST_CHUNK = 1 << 32  # bytes of plain data, a bound against damaged sizes
 
 
@@ -142,12 +144,13 @@ class ChunkHead:
         try:
             _, _, plain_size, crc = _CHUNK.unpack_from(content, 0)
             (name_size,) = struct.unpack_from('<I', content, _CHUNK.size)
-            name = content[_CHUNK.size + 4 : _CHUNK.size + 4 + min(name_size, 8)]
+            name = content[_CHUNK.size + 4 : _CHUNK.size + 4 + min(name_size, _LONGEST_NAME)]
             data_at = _CHUNK_FIELDS + len(name)
             (data_size,) = struct.unpack_from('<Q', content, data_at - 8)
         except struct.error:
             raise DamageError('a chunk is cut off') from None
-        if name not in COMPRESSION_MAGICS or length < data_at + data_size:
+        known = name in COMPRESSION_MAGICS or re.fullmatch(rb'[a-z0-9_-]+', name)
+        if not known or length < data_at + data_size:
             raise DamageError('a chunk states lengths that disagree')
         return cls(plain_size, crc, name, data_at, data_size)
 
@@ -230,4 +233,6 @@ def _decompress(head: ChunkHead, data: bytes) -> bytes:
         return decompress_zstd(data, head.plain_size)
     if head.compression == b'lz4':
         return decompress_lz4(data, head.plain_size)
+    if head.compression:
+        raise DamageError(f'the compression {head.compression.decode()!r} is not known')
     return data

@@ -118,7 +118,9 @@ def _is_chunk(source: Source, at: int, length: int) -> bool:
         head = ChunkHead.of(start[HEAD.size :], length)
     except DamageError:
         return False
-    if not head.data_size or length - head.data_at - head.data_size > _LONGEST_EXTENSION:
+    if head.compression not in COMPRESSION_MAGICS or not head.data_size:
+        return False
+    if length - head.data_at - head.data_size > _LONGEST_EXTENSION:
         return False
     data = start[HEAD.size + head.data_at :]
     if head.compression:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from mcap.records import Schema
 
 from disc_sim_ros.bags import metadata
-from disc_sim_ros.bags.contents import Contents, chunk_bytes
+from disc_sim_ros.bags.contents import Chunk, Contents, chunk_bytes
 from disc_sim_ros.bags.definitions import (
     Definition,
     channel_of,
@@ -42,8 +42,12 @@ class RepairPlan:
         reasons = []
         if not contents.complete:
             reasons.append('it was damaged or had no end')
-        elif indexed(contents.path, contents.unpacked) is None:
-            reasons.append('it had no full index')
+        else:
+            index = indexed(contents.path, contents.unpacked)
+            if index is None:
+                reasons.append('it had no full index')
+            elif not _agree(index, contents):
+                reasons.append('its index was wrong')
         records = [m.metadata for m in contents.metadata if m.name == metadata.RECORD]
         if any(metadata.has_root(content) for content in records):
             reasons.append('rosbag2 refused the form of its metadata record')
@@ -128,6 +132,25 @@ class RepairPlan:
             TopicInfo(topic=topic, message_count=counts.get(key, 0))
             for key, topic in topics.items()
         )
+
+
+def _agree(index: Contents, contents: Contents) -> bool:
+    """Return True if the index of a file tells of what is in it."""
+    chunks = {c.offset: c for c in index.chunks}
+    return (
+        {i: n for i, n in index.counts.items() if n} == contents.counts
+        and index.channels == contents.channels
+        and index.schemas.items() <= contents.schemas.items()
+        and sorted(index.attachments) == contents.attachments
+        and all(c.offset in chunks and _covers(chunks[c.offset], c) for c in contents.chunks)
+    )
+
+
+def _covers(indexed_chunk: Chunk, chunk: Chunk) -> bool:
+    if (indexed_chunk.start, indexed_chunk.end) != (chunk.start, chunk.end):
+        return False
+    channels = indexed_chunk.channels
+    return channels is None or channels >= (chunk.channels or frozenset())
 
 
 def _profiles(about: BagMetadata, found: Sequence[Contents]) -> dict[str, tuple[Qos, ...]]:

@@ -16,17 +16,19 @@ def parser(prog: str = 'repair_bag') -> Parser:
     """Return the command line of `repair_bag`."""
     p = Parser(
         prog=prog,
-        description='Copy every complete message of a damaged bag, for example of a recorder '
-        'that was killed or whose disk was full, into a new bag with index and metadata.yaml. '
-        'Damaged parts are skipped and reported by their position in the file, in bytes. Log and '
-        'publish times (ns), definitions, QoS, attachments and custom_data do not change. IN is '
-        'only read.',
+        description='Copy every complete message of a bag into a new bag with index and '
+        'metadata.yaml: of a recorder that was killed or whose disk was full, of a bag with lost '
+        'or compressed files, or of one that `ros2 bag play` refuses. Damaged and missing parts '
+        'are skipped and reported by their position in the file, in bytes, with the number of '
+        'messages where it is known. Log and publish times (ns), definitions, QoS, attachments '
+        'and custom_data do not change; a file in which nothing is wrong is copied byte for byte. '
+        'IN is only read.',
         epilog='Exit code 0: OUT is a complete bag, even if messages of IN were lost; 1: OUT '
-        'could not be made; 2: bad input.',
+        'could not be made, or nothing of IN can be kept; 2: bad input.',
     )
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    p.add_argument('source', metavar='IN', help='folder of a bag, or an .mcap file')
+    p.add_argument('source', metavar='IN', help='folder of a bag, or an .mcap or .mcap.zstd file')
     p.add_argument('target', metavar='OUT', help='folder to make; it must not exist')
     p.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'

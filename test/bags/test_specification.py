@@ -120,6 +120,18 @@ def test_records_in_a_chunk_may_be_longer_than_their_fields(tmp_path):
     assert bag.message_count == len(everything(bag)) == len(MESSAGES)
 
 
+def test_a_compression_that_is_not_known_is_named_and_the_rest_read(tmp_path):
+    data = b''.join(packed(r) for r in EVERYTHING[:-2])
+    strange = packed(Chunk('brotli', b'??', 9, 0, 0, len(data)))
+    path = tmp_path / 'x.mcap'
+    path.write_bytes(mcap_bytes([SCHEMA, CHANNEL, strange, *MESSAGES], summary=frozenset()))
+    report = repair(path, tmp_path / 'made')
+    assert report.message_count == len(MESSAGES)
+    [loss] = report.losses
+    assert "the compression 'brotli' is not known" in str(loss)
+    assert loss.length == len(strange)
+
+
 @pytest.mark.parametrize('opcode', [0x10, 0x42, 0x7F, 0x80, 0xFF])
 @pytest.mark.parametrize('chunked', [True, False])
 @pytest.mark.parametrize('size', [0, 5, 200_000])
