@@ -34,6 +34,10 @@ test: setup-test ## setup, then every test, ruff, mypy and the import rules
 lint: setup-test ## the same without the tests
 	@tools/check ruff format mypy imports
 
+docs: setup-test ## build the documentation site in build/docs
+	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs build/docs
+	@echo 'open build/docs/index.html'
+
 fly: setup ## throw a disc in real time, record and plot it (DISC=wraith THROW='--speed 25 --spin 120')
 	@if $(BIN)/python -c 'import rclpy' 2>/dev/null; then \
 		$(BIN)/demo $(if $(DISC),--disc '$(DISC)') $(THROW); \
@@ -56,6 +60,6 @@ fuzz: setup-test ## fuzz every input, 10 minutes each (after .venv/bin/pip insta
 	@nice -n 19 $(BIN)/python benchmarks/fuzz/run.py all --seconds 600
 
 clean: ## remove .venv, builds and caches; keep flights/ and bags/
-	rm -rf .venv build dist install log *.egg-info .coverage .hypothesis \
+	rm -rf .venv build dist install log docs/api *.egg-info .coverage .hypothesis \
 		.import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

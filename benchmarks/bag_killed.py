@@ -58,7 +58,6 @@ def lines(parent: Path = Path()) -> tuple[Line, ...]:
             ratio=worst / FLUSH_PERIOD,
             bound=f'at most {MOST:g} s',
             kept=worst <= MOST,
-            short=True,
         ),
     )
 

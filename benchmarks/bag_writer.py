@@ -69,7 +69,6 @@ def lines(parent: Path = Path()) -> tuple[Line, ...]:
             ratio=ratio,
             bound=f'at least {LEAST:g} times',
             kept=ratio >= LEAST,
-            short=True,
         ),
     )
 

@@ -121,7 +121,6 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
             ratio=together / alone,
             bound=f'at least {LEAST:,} a second, less than 1 mm off',
             kept=together >= LEAST,
-            short=True,
         ),
         Line(
             what=f'memory of {many[0]:,} flights in batches',

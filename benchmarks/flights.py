@@ -78,7 +78,6 @@ def lines() -> tuple[Line, ...]:
             f'{number(error * 1e3, 1)} mm off',
             bound=f'at least {LEAST:,}, less than 1 mm off',
             kept=rate >= LEAST,
-            short=True,
         ),
         Line(
             what='the same, default step',

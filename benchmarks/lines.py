@@ -1,4 +1,4 @@
-"""What a benchmark found, as data: each has `lines()`, and benchmarks/run.py gathers them."""
+"""Results as data: each benchmark has a function `lines()`, and benchmarks/run.py calls it."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ class Line:
     """One comparison within one run.
 
     Attributes:
-        what: What was measured.
-        ours: What this package does, with its unit.
-        beside: What it was compared with, and what that does; empty for nothing.
-        ratio: The comparison as a number; None where it is none, or the peer is absent.
-        bound: What is to be kept, in words; empty for no bound.
-        kept: Whether it was; None without a bound, or if it could not be measured.
-        short: Whether it is one of the few lines of README.md.
+        what: The quantity.
+        ours: The result of this package, with its unit.
+        beside: The peer and its result; empty without a peer.
+        ratio: The comparison as a number; None if there is no number, or the peer is absent.
+        bound: The bound, in words; empty without a bound.
+        kept: True if the bound was kept; None without a bound, or if it could not be measured.
+        short: True if README.md shows the line.
     """
 
     what: str
@@ -27,7 +27,7 @@ class Line:
 
 
 def number(value: float, digits: int = 2) -> str:
-    """Return a figure as people write it: some significant digits, thousands apart."""
+    """Return a figure with a few significant digits and separators of thousands."""
     if value == 0.0:
         return '0'
     rounded = float(f'{value:.{digits - 1}e}')
@@ -37,14 +37,14 @@ def number(value: float, digits: int = 2) -> str:
 
 
 def print_lines(lines: tuple[Line, ...]) -> None:
-    """Print what a benchmark found, one comparison each."""
+    """Print the results of a benchmark, one comparison a line."""
     for line in lines:
         words = [f'{line.what}: {line.ours}']
         if line.beside:
-            words.append(f'beside {line.beside}')
+            words.append(f'peer: {line.beside}')
         if line.ratio is not None:
             words.append(f'ratio {number(line.ratio, 3)}')
         if line.bound:
-            told = {True: 'kept', False: 'NOT KEPT', None: 'not measured'}[line.kept]
-            words.append(f'bound: {line.bound}, {told}')
+            verdict = {True: 'kept', False: 'NOT KEPT', None: 'not measured'}[line.kept]
+            words.append(f'bound: {line.bound}, {verdict}')
         print('; '.join(words))

@@ -102,7 +102,6 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
             ratio=late,
             bound=f'at most {MOST_LATE:g} times',
             kept=late <= MOST_LATE,
-            short=True,
         ),
         Line(
             what='physics, `odom` and `pose` at 10 kHz',

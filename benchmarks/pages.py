@@ -1,22 +1,23 @@
-"""Results of benchmarks/run.py as JSON, and as the tables of docs/benchmarks.md and README.md."""
+"""Results of benchmarks/run.py as JSON, as a table in docs/benchmarks.md, as lines of README."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
+import textwrap
 
 from lines import Line, number
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs/benchmarks.json'
-PAGES = {ROOT / 'docs/benchmarks.md': False, ROOT / 'README.md': True}  # True: the short table
-BUSY = 1.0  # load average at the start, from which others are at work
+PAGES = {ROOT / 'docs/benchmarks.md': False, ROOT / 'README.md': True}  # True: a few lines
+BUSY = 1.0  # a higher load average at the start means that other programs run
 BEGIN, END = '<!-- benchmarks: written by `make bench` -->', '<!-- end of benchmarks -->'
 
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:
-    """What was measured on, and when."""
+    """The machine of a measurement, and the date."""
 
     cpu: str
     cores: int
@@ -27,21 +28,21 @@ class Machine:
     date: str
     load_at_start: float  # average of a minute
     load_at_end: float
-    seconds: float  # that it took
+    seconds: float  # duration of all benchmarks
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """What one benchmark found."""
+    """The results of one benchmark."""
 
     command: str
-    load: float  # average of the minute before it began
+    load: float  # average of the minute before the start
     lines: tuple[Line, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """What `make bench` found."""
+    """The results of `make bench`."""
 
     machine: Machine
     results: tuple[Result, ...]
@@ -68,29 +69,35 @@ def loaded(text: str) -> Run:
 
 def described(machine: Machine) -> str:
     """Return the machine in a sentence."""
-    busy = ' Other work kept it busy: a quiet machine is faster and more even.'
+    busy = ' Other programs were running: an idle machine is faster and more even.'
     return (
         f'Measured in {machine.seconds / 60:.0f} minutes on {machine.date}: {machine.cpu}, '
         f'{machine.cores} cores, {machine.system}; Python {machine.python}, numba '
         f'{machine.numba}, numpy {machine.numpy}; load average {machine.load_at_start:.1f} when '
-        f'it began and {machine.load_at_end:.1f} when it ended.'
+        f'it started and {machine.load_at_end:.1f} when it ended.'
         f'{busy if machine.load_at_start > BUSY else ""}'
     )
 
 
 def section(run: Run, *, short: bool) -> str:
-    """Return what stands between the markers of a page."""
+    """Return the text between the markers of a page: a table, or a list of the short lines."""
     if short:
-        head = ('what', 'here', 'beside', 'ratio')
-        rows = [cells(line) for result in run.results for line in result.lines if line.short]
-    else:
-        head = ('what', 'here', 'beside', 'ratio', 'to keep', 'load', 'command')
-        rows = [
-            (*cells(line), bound(line), f'{result.load:.1f}', f'`{result.command}`')
-            for result in run.results
-            for line in result.lines
-        ]
+        return '\n'.join(
+            item(line) for result in run.results for line in result.lines if line.short
+        )
+    head = ('measurement', 'this package', 'peer', 'ratio', 'bound', 'load', 'command')
+    rows = [
+        (*cells(line), bound(line), f'{result.load:.1f}', f'`{result.command}`')
+        for result in run.results
+        for line in result.lines
+    ]
     return f'{table(head, rows)}\n\n{described(run.machine)}'
+
+
+def item(line: Line) -> str:
+    """Return a line as an item of a list in Markdown, at most 99 characters wide."""
+    peer = f'; peer: {line.beside}' if line.beside else ''
+    return textwrap.fill(f'- {line.what}: {line.ours}{peer}', 99, subsequent_indent='  ')
 
 
 def cells(line: Line) -> tuple[str, ...]:
@@ -100,9 +107,9 @@ def cells(line: Line) -> tuple[str, ...]:
 
 
 def bound(line: Line) -> str:
-    """Return what is to be kept, and whether it was."""
-    told = {True: 'kept', False: '**not kept**', None: 'not measured'}[line.kept]
-    return f'{line.bound}: {told}' if line.bound else ''
+    """Return the bound of a line, and whether it was kept."""
+    verdict = {True: 'kept', False: '**not kept**', None: 'not measured'}[line.kept]
+    return f'{line.bound}: {verdict}' if line.bound else ''
 
 
 def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
@@ -115,16 +122,16 @@ def replaced(page: str, text: str) -> str:
     """Return a page with other text between its markers.
 
     Raises:
-        ValueError: It has not one pair of markers.
+        ValueError: The page does not have exactly one pair of markers.
     """
     if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(BEGIN) > page.index(END):
-        raise ValueError(f'a page needs one {BEGIN} and one {END} behind it')
+        raise ValueError(f'a page needs one {BEGIN} and one {END} after it')
     before, rest = page.split(BEGIN)
     return f'{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}'
 
 
 def between(page: str) -> str:
-    """Return what stands between the markers of a page."""
+    """Return the text between the markers of a page."""
     return page.partition(f'{BEGIN}\n')[2].partition(f'\n{END}')[0]
 
 

@@ -98,7 +98,6 @@ def lines(seconds: float = 3.0) -> tuple[Line, ...]:
             ours=own,
             beside=f'FrisPy {number(theirs)}, {number(off * 1e3, 1)} mm off',
             ratio=mine / theirs,
-            short=True,
         ),
         Line(
             what='ten times the inertia moves the end',

@@ -1,8 +1,7 @@
-"""Run all benchmarks, one after the other, and gather what they found in one table.
+"""Run all benchmarks, one after the other, and collect their results in one table.
 
-Each runs in a process of its own. Peers need an environment of their own (benchmarks/peers.py
-says how to make it); without it there is a line that says so. Takes about 6 minutes on a quiet
-machine.
+Each runs in its own process. Peers need their own environment (benchmarks/peers.py explains how to
+make it); without it their lines say so. Takes about 6 minutes on an idle machine.
 
 usage: benchmarks/run.py [--write] [--only NAME ...] [--peers PYTHON]
 """
@@ -26,7 +25,7 @@ from lines import Line, print_lines
 import pages
 from pages import Machine, Result, Run
 
-# Name, the arguments of its lines(), and those of its command.
+# Name, arguments of its lines(), arguments of its command.
 BENCHMARKS: dict[str, tuple[dict[str, Any], str]] = {
     'flights': ({}, ''),
     'ensemble': ({'largest': 1e6}, ''),
@@ -42,7 +41,7 @@ PEERS = pages.ROOT / 'peers/bin/python'
 
 
 def main() -> int:
-    """Measure, print and, if asked to, write the pages."""
+    """Measure, print and, with --write, write the pages."""
     if sys.argv[1:2] == ['one']:
         return one(*sys.argv[2:])
     parser = argparse.ArgumentParser(
@@ -50,10 +49,10 @@ def main() -> int:
     )
     parser.add_argument('--write', action='store_true', help='write docs/ and README.md')
     parser.add_argument('--only', nargs='+', choices=BENCHMARKS, metavar='NAME',
-                        help=f'not all, and nothing is written: {", ".join(BENCHMARKS)}',
+                        help=f'run only these and write nothing: {", ".join(BENCHMARKS)}',
                         )  # fmt: skip
     parser.add_argument('--peers', type=Path, default=PEERS, metavar='PYTHON',
-                        help='Python that has the peers (default: peers/bin/python)',
+                        help='Python with the peers installed (default: peers/bin/python)',
                         )  # fmt: skip
     chosen = parser.parse_args()
     if chosen.only and chosen.write:
@@ -75,23 +74,23 @@ def main() -> int:
 
 
 def measured(names: list[str], peers: Path, *, write: bool) -> tuple[Run, list[str]]:
-    """Run some benchmarks; return what they found and which of them failed."""
+    """Run some benchmarks; return their results and the names of those that failed."""
     load, begun = os.getloadavg()[0], time.monotonic()
     results, failed = [], []
     for name in names:
         try:
             results.append(result(name, peers, write=write))
-        except subprocess.CalledProcessError:  # it has said why
+        except subprocess.CalledProcessError:  # the process has printed the reason
             failed.append(name)
-    found = Run(machine=machine(load, time.monotonic() - begun), results=tuple(results))
-    return found, failed
+    run = Run(machine=machine(load, time.monotonic() - begun), results=tuple(results))
+    return run, failed
 
 
 def result(name: str, peers: Path, *, write: bool) -> Result:
-    """Run one benchmark in a process of its own.
+    """Run one benchmark in its own process.
 
     Raises:
-        CalledProcessError: It failed.
+        CalledProcessError: The benchmark failed.
     """
     arguments, words = BENCHMARKS[name]
     if name == 'steps':
@@ -102,10 +101,10 @@ def result(name: str, peers: Path, *, write: bool) -> Result:
     load = os.getloadavg()[0]
     print(f'== benchmarks/{name}.py', flush=True)
     with tempfile.TemporaryDirectory() as scratch:
-        found = Path(scratch, 'lines.json')
-        command = [python, __file__, 'one', name, json.dumps(arguments), str(found)]
+        file = Path(scratch, 'lines.json')
+        command = [python, __file__, 'one', name, json.dumps(arguments), str(file)]
         subprocess.run(command, cwd=pages.ROOT, check=True)
-        lines = json.loads(found.read_text(encoding='utf-8'))
+        lines = json.loads(file.read_text(encoding='utf-8'))
     return Result(
         command=f'benchmarks/{name}.py{words}',
         load=load,
@@ -114,14 +113,14 @@ def result(name: str, peers: Path, *, write: bool) -> Result:
 
 
 def one(name: str, arguments: str, file: str) -> int:
-    """Be the process of one benchmark."""
+    """Run one benchmark in this process and write its lines to a file."""
     lines = importlib.import_module(name).lines(**json.loads(arguments))
     Path(file).write_text(json.dumps([asdict(line) for line in lines]), encoding='utf-8')
     return 0
 
 
 def machine(load: float, seconds: float) -> Machine:
-    """Describe this machine, its load at the start and how long it took [s]."""
+    """Describe this machine, its load at the start and the duration [s]."""
     from flights import cpu_name  # noqa: PLC0415 - not in the environment of the peers
 
     return Machine(

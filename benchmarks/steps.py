@@ -189,7 +189,6 @@ def worth(throw: Throw, setup: Setup) -> Line:
         beside=f'attitude and rates in axes fixed in the disc {told[SPINNING]}; '
         f'velocity too {told[PRINTED]}',
         ratio=cost[SPINNING] / cost[DESPUN],
-        short=throw.launch.spin > 50.0,
     )
 
 

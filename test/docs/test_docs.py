@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.analysis import flight_report
+from disc_sim_ros.cli import fly as fly_command
 from disc_sim_ros.cli.fly import parser
 from disc_sim_ros.physics import disc, disc_file, environment, frames, theory
 from disc_sim_ros.physics.flight import Flight, Setup, fly
@@ -86,6 +87,24 @@ def test_examples_run_and_print_what_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('MPLBACKEND', 'agg')
     run_examples(page.read_text(encoding='utf-8'), str(page))
+
+
+def fly_examples(text: str) -> list[tuple[str, str]]:
+    """Return flags and output of each sh block that has one `fly` and a text block after it."""
+    pairs = zip(found := list(blocks(text)), found[1:], strict=False)
+    return [
+        (block.text.removeprefix('.venv/bin/fly').strip(), after.text)
+        for block, after in pairs
+        if block.kind == 'sh' and after.kind == 'text' and after.first - block.last < 4
+        if block.text.startswith('.venv/bin/fly') and block.text.count('\n') == 1
+    ]
+
+
+@pytest.mark.parametrize('page', [DOCS / 'fly.md', ROOT / 'README.md'], ids=lambda p: p.name)
+def test_fly_prints_what_the_page_says(page, capsys):
+    (example,) = fly_examples(page.read_text(encoding='utf-8'))
+    assert fly_command.main(example[0].split()) == 0
+    assert capsys.readouterr().out.rstrip() == example[1].rstrip()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,80 @@
+"""`make docs` builds the documentation site without a warning, and the site needs no network."""
+
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+for package in ('sphinx', 'myst_parser', 'furo'):
+    pytest.importorskip(package, reason='needs the extra [docs]: pip install -e .[docs]')
+
+ROOT = Path(__file__).parents[2]
+NO_API = "\nexec(open(r'{}').read())\napidoc_modules = []\n"
+
+
+def build(source: Path, target: Path) -> subprocess.CompletedProcess[str]:
+    """Run Sphinx with the options of `make docs`."""
+    (options,) = re.findall(r'-m sphinx (.*) docs build/docs', (ROOT / 'Makefile').read_text())
+    return subprocess.run(
+        [sys.executable, '-m', 'sphinx', *options.split(), source, target],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory) -> Path:
+    """Return the folder of the site, built from a copy of docs/: Sphinx writes into its source."""
+    tree = tmp_path_factory.mktemp('site')
+    shutil.copytree(ROOT / 'docs', tree / 'docs', ignore=shutil.ignore_patterns('api'))
+    for name in ('disc_sim_ros', 'config'):
+        (tree / name).symlink_to(ROOT / name)
+    for name in ('CONTRIBUTING.md', 'CHANGELOG.rst'):  # links in them are relative to their folder
+        shutil.copy(ROOT / name, tree)
+    done = build(tree / 'docs', tree / 'build')
+    assert done.returncode == 0, done.stderr
+    return tree / 'build'
+
+
+@pytest.mark.slow
+def test_every_page_is_in_the_site(site):
+    for page in (ROOT / 'docs').glob('*.md'):
+        assert (site / f'{page.stem}.html').is_file()
+    index = (site / 'index.html').read_text(encoding='utf-8')
+    assert 'href="deviations.html"' in index
+
+
+@pytest.mark.slow
+def test_the_reference_has_the_docstrings_of_functions_classes_and_kernels(site):
+    for page, name, words in (
+        ('physics.flight', 'disc_sim_ros.physics.flight.fly', 'Returns'),
+        ('physics.launch', 'disc_sim_ros.physics.launch.Launch', 'Raises'),
+        ('physics.kernels.equations', 'disc_sim_ros.physics.kernels.equations.derivative', ''),
+    ):
+        text = (site / f'api/disc_sim_ros.{page}.html').read_text(encoding='utf-8')
+        assert f'id="{name}"' in text
+        assert words in text
+
+
+@pytest.mark.slow
+def test_the_site_needs_no_network(site):
+    outside = re.compile(
+        r'<(?:script|img|iframe|source)[^>]* src(?:set)?="https?:'
+        r'|<link[^>]* rel="(?:stylesheet|preload)"[^>]* href="https?:'
+    )
+    pages = list(site.rglob('*.html'))
+    assert len(pages) > 50
+    assert [page.name for page in pages if outside.search(page.read_text(encoding='utf-8'))] == []
+
+
+def test_a_broken_link_fails_the_build(tmp_path):
+    (tmp_path / 'conf.py').write_text(NO_API.format(ROOT / 'docs/conf.py'), encoding='utf-8')
+    index = tmp_path / 'index.md'
+    index.write_text('# Title\n\n[a link](#title)\n', encoding='utf-8')
+    assert build(tmp_path, tmp_path / 'good').returncode == 0
+    index.write_text('# Title\n\n[a link](gone.md)\n', encoding='utf-8')
+    done = build(tmp_path, tmp_path / 'bad')
+    assert done.returncode == 1
+    assert 'gone.md' in done.stderr
