@@ -27,24 +27,24 @@ SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz', 'security')
 
 
 class DataDistribution(Distribution):
-    """Tells `pip install -e` that there are data files; without it they are skipped."""
+    """Makes `pip install -e` install the data files; setuptools would skip them."""
 
     def has_data(self) -> bool:
-        """Answer the question that editable_wheel asks, which setuptools leaves open."""
+        """Return True if there are data files; editable_wheel calls this."""
         return self.has_data_files()
 
 
 def version() -> str:
     """Read the version without importing the package and what it needs."""
     text = Path(NAME, '__init__.py').read_text(encoding='utf-8')
-    found = re.search(r"^__version__ = '([^']+)'$", text, re.MULTILINE)
-    if found is None:
+    match = re.search(r"^__version__ = '([^']+)'$", text, re.MULTILINE)
+    if match is None:
         raise RuntimeError(f"{NAME}/__init__.py: no line __version__ = '...'")
-    return found[1]
+    return match[1]
 
 
 def data_files() -> list[tuple[str, list[str]]]:
-    """List every file outside the package and the folder it is installed in."""
+    """Return the files outside the package, by the folder in which they are installed."""
     files = [
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -55,7 +55,7 @@ def data_files() -> list[tuple[str, list[str]]]:
         for path in shared
         if path.is_file() and '__pycache__' not in path.parts
     ]
-    # A wheel ignores install_scripts in setup.cfg: colcon alone would fill lib/disc_sim_ros.
+    # A wheel ignores install_scripts in setup.cfg; only colcon fills lib/disc_sim_ros by itself.
     if {'bdist_wheel', 'editable_wheel', 'sdist'} & set(sys.argv):
         files.append(
             (f'lib/{NAME}', sorted(path.as_posix() for path in Path('scripts').iterdir()))
@@ -71,9 +71,27 @@ setup(
         'Flies a Frisbee after Crowther and Potts (2007): correct gyroscopics, control inputs, '
         'ROS 2 messages, MCAP bags.'
     ),
+    author='disc_sim_ros maintainers',
     maintainer='disc_sim_ros maintainers',
     maintainer_email='maintainers@disc-sim.example.org',
     license='Apache-2.0',
+    keywords=['disc', 'flight dynamics', 'frisbee', 'MCAP', 'ROS 2', 'simulation'],
+    # No URLs: the project has no public address yet.
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Developers',
+        'Intended Audience :: Education',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3',
+        'Programming Language :: Python :: 3.11',
+        'Programming Language :: Python :: 3.12',
+        'Programming Language :: Python :: 3.13',
+        'Programming Language :: Python :: 3.14',
+        'Topic :: Scientific/Engineering :: Physics',
+        'Topic :: Scientific/Engineering :: Visualization',
+        'Typing :: Typed',
+    ],
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: ['py.typed', 'physics/discs/*.yaml', 'paper/data/*']},
     data_files=data_files(),
@@ -95,8 +113,8 @@ setup(
         'zstandard>=0.22,<1',
     ],
     extras_require={
-        # Only for people without a ROS installation. Always the ros-jazzy- names: the bare ones
-        # are the next distribution.
+        # For machines without a ROS installation. Always the ros-jazzy- names: names without the
+        # distribution are of a later one.
         'jazzy': [
             'ros-jazzy-rclpy[fastrtps]',
             'ros-jazzy-common-interfaces',
