@@ -3,6 +3,8 @@
 from importlib import metadata
 import importlib.util
 import os
+import re
+from typing import Any
 
 os.environ['NUMBA_DISABLE_JIT'] = '1'  # compiled functions would hide their docstrings
 
@@ -46,3 +48,16 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 # Sphinx takes the words `type` and `shape` in docstrings for names of attributes.
 suppress_warnings = ['ref.python']
+
+
+def escape_markup(*event: Any) -> None:
+    """Escape characters outside backticks that are markup in reStructuredText, such as |x|."""
+    lines: list[str] = event[-1]
+    parts = '\n'.join(lines).split('`')
+    parts[::2] = (re.sub(r'[\\|*]|_(?=\W|$)', r'\\\g<0>', part) for part in parts[::2])
+    lines[:] = '`'.join(parts).split('\n')
+
+
+def setup(app: Any) -> None:
+    """Treat docstrings as plain text, before napoleon reads their sections."""
+    app.connect('autodoc-process-docstring', escape_markup, priority=400)
