@@ -60,7 +60,7 @@ def _change(inner: list[tuple[int, bytes]], rng: random.Random) -> None:
         inner[at] = (opcode, content[: rng.randrange(len(content) + 1)])
     elif what < 0.35:  # a longer record, as the specification allows
         inner[at] = (opcode, content + rng.randbytes(rng.randrange(1, 9)))
-    elif what < 0.4:  # a record of an opcode that nobody knows yet
+    elif what < 0.4:  # a record of an unknown opcode
         strange = rng.randrange(0x10, 0x100), rng.randbytes(rng.randrange(20))
         inner.insert(rng.randrange(len(inner) + 1), strange)
     elif opcode == _CHUNK and what < 0.8:

@@ -61,14 +61,16 @@ def bag_folder(path: Path) -> BagFolder:
     if not path.is_dir():
         raise BagError(f'{path}: there is no such bag')
     listed = _metadata(path / metadata.FILE_NAME)
-    found = _present(path)
+    present = _present(path)
     if listed is not None:
-        _refuse_storage(path, listed, found)
-    if not found:
+        _refuse_storage(path, listed, present)
+    if not present:
         raise BagError(_no_files(path, listed))
     if listed is None:
-        return BagFolder(path, tuple(found), losses=tuple(_holes(path, (f.name for f in found))))
-    return _compare(path, listed, found)
+        return BagFolder(
+            path, tuple(present), losses=tuple(_holes(path, (f.name for f in present)))
+        )
+    return _compare(path, listed, present)
 
 
 def read_files(folder: BagFolder, read: Read) -> list[Contents]:
@@ -79,17 +81,17 @@ def read_files(folder: BagFolder, read: Read) -> list[Contents]:
     Raises:
         BagError: No file can be read, or one is in another format.
     """
-    found: list[Contents] = []
+    all_contents: list[Contents] = []
     failures: list[BagError] = []
     for file in folder.files:
         contents = _read_file(file, read, failures)
         expected = folder.infos.get(file)
         if expected is not None:
             _count_missing(contents, expected)
-        found.append(contents)
+        all_contents.append(contents)
     if failures and len(failures) == len(folder.files):
         raise failures[0]
-    return found
+    return all_contents
 
 
 def _read_file(file: Path, read: Read, failures: list[BagError]) -> Contents:
@@ -251,11 +253,11 @@ def _metadata(path: Path) -> BagMetadata | None:
         return None
 
 
-def _refuse_storage(path: Path, listed: BagMetadata, found: Sequence[Path]) -> None:
+def _refuse_storage(path: Path, listed: BagMetadata, present: Sequence[Path]) -> None:
     """Refuse a bag in another format, unless the files on the disk are MCAP all the same."""
     there = [path / f.path for f in listed.files if (path / f.path).is_file()]
     others = [p for p in there if not p.name.endswith(_ENDINGS)]
-    if listed.storage not in {'', 'mcap'} and (others or not found):
+    if listed.storage not in {'', 'mcap'} and (others or not present):
         advice = 'convert it with `ros2 bag convert`'
         raise BagError(f'{path}: a bag in {listed.storage} format is not read; {advice}')
 
@@ -270,9 +272,9 @@ def _no_files(path: Path, listed: BagMetadata | None) -> str:
     return f'{path}: no bag, there is no .mcap file in it'
 
 
-def _compare(path: Path, listed: BagMetadata, found: Sequence[Path]) -> BagFolder:
+def _compare(path: Path, listed: BagMetadata, present: Sequence[Path]) -> BagFolder:
     """Find the files that metadata.yaml lists, and those of the bag that it does not list."""
-    rest = {_plain_name(f.name): f for f in found}
+    rest = {_plain_name(f.name): f for f in present}
     infos: dict[Path, FileInfo] = {}
     missing: list[FileInfo] = []
     for info in listed.files:
@@ -291,7 +293,7 @@ def _compare(path: Path, listed: BagMetadata, found: Sequence[Path]) -> BagFolde
             infos[other] = info
             loss = Loss(path / info.path, 0, 0, f'it is missing; {other.name} stands for it', 0)
         losses.append(loss)
-    # The recorder may have been killed between a new file and the metadata that tells of it.
+    # The recorder may have been killed between a new file and the metadata that lists it.
     stems = _stems(listed) | {_stem(f.name) for f in infos}
     more = [f for f in rest.values() if not infos or _stem(f.name) in stems - {None}]
     if missing:

@@ -39,7 +39,7 @@ _KINDS: dict[int, type[McapRecord]] = {
 
 
 def indexed(path: Path, unpacked: Path | None = None) -> Contents | None:
-    """Return what a file holds by its index; None where it has none that tells of everything.
+    """Return what a file holds by its index; None if no index covers all of it.
 
     Args:
         path: The file.
@@ -68,7 +68,7 @@ class _Summary:
     attachments: list[AttachmentIndex] = field(default_factory=list)
     metadata: list[MetadataIndex] = field(default_factory=list)
 
-    def tells_of_everything(self) -> bool:
+    def covers_everything(self) -> bool:
         """Return True if nothing that the statistics count is without an entry."""
         s = self.statistics
         if s is None:
@@ -94,13 +94,13 @@ class _Index:
         self._size = file.seek(0, 2)
 
     def fill(self, contents: Contents) -> bool:
-        """Put in what the index tells; return False if it does not tell of everything.
+        """Put in what the index lists; return False if it does not cover everything.
 
         Raises:
             DamageError: The index or a record in the data section is no such record.
         """
         summary = self._summary()
-        if summary is None or not summary.tells_of_everything():
+        if summary is None or not summary.covers_everything():
             return False
         if not self._walk(summary, contents):
             return False

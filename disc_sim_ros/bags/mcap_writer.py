@@ -1,7 +1,7 @@
 """One MCAP file as rosbag2 writes it: chunks, indexes, summary.
 
 The records are those of the `mcap` package. Its `Writer` is not used: it counts what it is about
-to write, so that after a full disk its index would tell of chunks that are not there.
+to write, so that after a full disk its index would list chunks that are not there.
 """
 
 from collections.abc import Callable, Iterable

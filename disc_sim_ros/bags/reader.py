@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
@@ -88,16 +88,16 @@ class Bag:
         Raises:
             BagError: One is damaged.
         """
-        found = []
+        attachments = []
         for contents in self.contents:
             if contents.attachments:
                 with _opened(contents) as file:
                     for offset in contents.attachments:
                         try:
-                            found.append(attachment_at(file, offset))
+                            attachments.append(attachment_at(file, offset))
                         except DamageError as error:
                             raise _damage(contents.path, offset, error) from None
-        return tuple(found)
+        return tuple(attachments)
 
     def raw(self, names: Iterable[str] | None = None) -> Iterator[RawMessage]:
         """Yield the messages of all or of the named topics, in the order of their log times.
@@ -210,18 +210,25 @@ def is_listed(folder: BagFolder, contents: Iterable[Contents]) -> bool:
 
 
 def reported(contents: Iterable[Contents], folder: BagFolder) -> BagMetadata:
-    """Return what metadata.yaml says, or else the last such record in the files."""
-    if folder.metadata is not None:
-        return folder.metadata
-    found = BagMetadata()
+    """Return what metadata.yaml says, or else the last such record in the files.
+
+    `ros2 bag reindex` makes a metadata.yaml without custom data and distribution: these are taken
+    from the record.
+    """
+    record = BagMetadata()
     for c in contents:
-        for record in c.metadata:
-            if record.name == metadata.RECORD:
-                try:
-                    found = metadata.parse_record(record.metadata)
-                except BagError:
-                    continue
-    return found
+        for m in c.metadata:
+            if m.name == metadata.RECORD:
+                with suppress(BagError):
+                    record = metadata.parse_record(m.metadata)
+    about = folder.metadata
+    if about is None:
+        return record
+    return replace(
+        about,
+        custom_data=about.custom_data or record.custom_data,
+        ros_distro=about.ros_distro or record.ros_distro,
+    )
 
 
 def repeated_chunk(contents: Contents) -> Chunk | None:

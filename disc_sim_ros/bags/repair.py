@@ -56,18 +56,22 @@ def repair(
             progress(f'reading {file}')
             return scanned(file, unpacked)
 
-        found = read_files(folder, read)
+        all_contents = read_files(folder, read)
     except OSError as error:
         raise BagError(f'{error.filename or source}: {reason(error)}') from None
-    whole = is_listed(folder, found) and not folder.losses and all(c.complete for c in found)
-    if not whole and not any(c.message_count or c.attachments for c in found):
-        losses = [*folder.losses, *(loss for c in found for loss in c.losses)]
+    whole = (
+        is_listed(folder, all_contents)
+        and not folder.losses
+        and all(c.complete for c in all_contents)
+    )
+    if not whole and not any(c.message_count or c.attachments for c in all_contents):
+        losses = [*folder.losses, *(loss for c in all_contents for loss in c.losses)]
         why = f' ({losses[0]})' if losses else ''
         raise BagError(f'{source}: nothing can be kept, there is no message in it{why}')
     try:
         with whole_folder('OUT', target) as made:
             made.mkdir()
-            repairer = _Repairer(folder, found, made, progress)
+            repairer = _Repairer(folder, all_contents, made, progress)
             repairer.run()
     except WriteError as error:
         why = f'{target}: cannot be written ({error.reason}); nothing is left of it'
@@ -107,18 +111,18 @@ class _Repairer:
     def __init__(
         self,
         folder: BagFolder,
-        found: Sequence[Contents],
+        all_contents: Sequence[Contents],
         made: Path,
         progress: Callable[[str], None],
     ) -> None:
-        self.losses = [*folder.losses, *(loss for c in found for loss in c.losses)]
+        self.losses = [*folder.losses, *(loss for c in all_contents for loss in c.losses)]
         self.mended: list[str] = []
         self.kept: dict[str, int] = {}
         self.attachments = 0
-        self._found = found
+        self._contents = all_contents
         self._made = made
         self._progress = progress
-        self._plan = RepairPlan(reported(found, folder), found)
+        self._plan = RepairPlan(reported(all_contents, folder), all_contents)
         self._written: list[_Written] = []
 
     def run(self) -> None:
@@ -128,7 +132,7 @@ class _Repairer:
             WriteError: The system refuses.
             OSError: A file of the source cannot be read.
         """
-        for number, contents in enumerate(self._found):
+        for number, contents in enumerate(self._contents):
             path = self._made / f'{self._made.name}_{number}.mcap'
             self._progress(f'writing {contents.message_count} messages of {contents.path}')
             reasons = self._plan.why_rewrite(contents)

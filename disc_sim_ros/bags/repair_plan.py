@@ -32,10 +32,10 @@ class RepairPlan:
         about: What is known of the whole bag, with the compression that its messages have.
     """
 
-    def __init__(self, about: BagMetadata, found: Sequence[Contents]) -> None:
-        self.about = _own_compression(about, found)
+    def __init__(self, about: BagMetadata, all_contents: Sequence[Contents]) -> None:
+        self.about = _own_compression(about, all_contents)
         self._types = {t.name: t.type for t in about.topics}
-        self._qos = _profiles(about, found)
+        self._qos = _profiles(about, all_contents)
 
     def why_rewrite(self, contents: Contents) -> list[str]:
         """Return what is wrong with a file; nothing if it can be copied as it is."""
@@ -135,7 +135,7 @@ class RepairPlan:
 
 
 def _agree(index: Contents, contents: Contents) -> bool:
-    """Return True if the index of a file tells of what is in it."""
+    """Return True if the index of a file agrees with what is in it."""
     chunks = {c.offset: c for c in index.chunks}
     return (
         {i: n for i, n in index.counts.items() if n} == contents.counts
@@ -153,10 +153,10 @@ def _covers(indexed_chunk: Chunk, chunk: Chunk) -> bool:
     return channels is None or channels >= (chunk.channels or frozenset())
 
 
-def _profiles(about: BagMetadata, found: Sequence[Contents]) -> dict[str, tuple[Qos, ...]]:
+def _profiles(about: BagMetadata, all_contents: Sequence[Contents]) -> dict[str, tuple[Qos, ...]]:
     """Return the QoS of each topic: that of metadata.yaml, or the longest list in a file."""
     profiles: dict[str, tuple[Qos, ...]] = {}
-    for contents in found:
+    for contents in all_contents:
         for channel in contents.channels.values():
             offered = topic_of(channel, None).qos
             if channel.message_encoding == 'cdr' and len(offered) > len(
@@ -166,9 +166,9 @@ def _profiles(about: BagMetadata, found: Sequence[Contents]) -> dict[str, tuple[
     return profiles | {t.name: t.topic.qos for t in about.topics if t.topic.qos}
 
 
-def _own_compression(about: BagMetadata, found: Iterable[Contents]) -> BagMetadata:
+def _own_compression(about: BagMetadata, all_contents: Iterable[Contents]) -> BagMetadata:
     """Return metadata with the compression that the messages have; files are never compressed."""
-    if any(_has_compressed_messages(contents) for contents in found):
+    if any(_has_compressed_messages(contents) for contents in all_contents):
         return replace(about, compression_format='zstd', compression_mode='MESSAGE')
     return replace(about, compression_format='', compression_mode='')
 

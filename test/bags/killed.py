@@ -19,7 +19,7 @@ bag = BagWriter(Path(folder), flush_period=float(period), max_size=int(max_size)
 topic = bag.add(Topic(name='/noise', type='std_msgs/msg/String', definition='string data'))
 Path(f'{folder}.taken').write_bytes(bytes(8))
 taken = mmap.mmap(os.open(f'{folder}.taken', os.O_RDWR), 8)
-told = 0
+printed = 0
 written = 0
 start = time.monotonic()
 while True:
@@ -30,7 +30,7 @@ while True:
         struct.pack_into('<Q', taken, 0, now)
     written = max(written, due)
     flushed = bag.flushed
-    if flushed != told:
+    if flushed != printed:
         os.write(1, f'{flushed}\n'.encode())
-        told = flushed
+        printed = flushed
     time.sleep(0.001)

@@ -46,7 +46,7 @@ def text(content: str) -> bytes:
 
 
 def topic(name: str, type_name: str, *profiles: Qos) -> Topic:
-    """A topic as the recorder tells of it."""
+    """A topic as the recorder describes it."""
     return Topic(
         name=name,
         type=type_name,

@@ -128,22 +128,22 @@ def test_a_type_that_only_metadata_names_survives(tmp_path):
     folder.mkdir()
     foreign_file(folder / 'bag_0.mcap', end=True, topics=[
         ('/odom', 'cdr', None, ODOMETRIES[5]), ('/odd', 'cdr', None, CDR_EMPTY)])  # fmt: skip
-    told = [('/odom', ODOMETRY, 1), ('/odd', 'odd_msgs/msg/Odd', 1), ('/silent', STRING, 0),
+    named = [('/odom', ODOMETRY, 1), ('/odd', 'odd_msgs/msg/Odd', 1), ('/silent', STRING, 0),
             ('/silent_odd', 'odd_msgs/msg/Even', 0)]  # fmt: skip
     about = BagMetadata(
         topics=tuple(
-            metadata.TopicInfo(topic=Topic(name=n, type=t), message_count=c) for n, t, c in told
+            metadata.TopicInfo(topic=Topic(name=n, type=t), message_count=c) for n, t, c in named
         ),
         files=(metadata.FileInfo(path='bag_0.mcap', message_count=2, start=START, end=START + 1),),
     )
     (folder / 'metadata.yaml').write_text(metadata.text_of(about), encoding='utf-8')
     before = open_bag(folder)
-    assert {t.name: t.type for t in before.topics} == {n: t for n, t, _ in told}
+    assert {t.name: t.type for t in before.topics} == {n: t for n, t, _ in named}
     assert [m.value.pose.pose.position.x for m in before.messages('/odom')] == [5.0]
     repair(folder, tmp_path / 'made')
     made = open_bag(tmp_path / 'made')
     assert {t.name: (t.type, t.message_count) for t in made.topics} == {
-        n: (t, c) for n, t, c in told
+        n: (t, c) for n, t, c in named
     }
     schema = {n: d[4] for n, d in definitions(tmp_path / 'made/made_0.mcap').items()}
     assert schema['/odom'] == (ODOMETRY, 'ros2msg', schemas.definition(ODOMETRY).encode())
@@ -341,6 +341,18 @@ def test_distro_and_custom_data_of_a_lone_file_survive(tmp_path, distro):
     assert records_of(tmp_path / 'made/made_0.mcap')[-1]['ros_distro'] == distro
 
 
+def test_distro_and_custom_data_that_a_reindex_dropped_are_taken_from_the_record(tmp_path):
+    write_bag(tmp_path / 'bag', 30, custom_data={'a': 'b'}, ros_distro='jazzy')
+    path = tmp_path / 'bag/metadata.yaml'
+    root = yaml.safe_load(path.read_text(encoding='utf-8'))
+    root['rosbag2_bagfile_information'] |= {'custom_data': None, 'ros_distro': ''}
+    path.write_text(yaml.safe_dump(root, sort_keys=False), encoding='utf-8')
+    repair(tmp_path / 'bag', tmp_path / 'made')
+    for folder in ('bag', 'made'):
+        about = open_bag(tmp_path / folder).metadata
+        assert (about.custom_data, about.ros_distro) == ({'a': 'b'}, 'jazzy')
+
+
 def test_the_distro_that_older_recorders_kept_beside_the_text_survives(tmp_path):
     path = tmp_path / 'x.mcap'
     about = metadata.record_of(BagMetadata())['serialized_metadata']
@@ -363,7 +375,7 @@ def test_a_bag_without_a_known_distro_gets_none(tmp_path):
 
 
 def test_qos_of_an_old_bag_that_differs_between_metadata_and_files_is_made_one(tmp_path):
-    """Version 0.1 told of publishers that came later in metadata.yaml alone."""
+    """Version 0.1 kept publishers that came later in metadata.yaml alone."""
     old_bag(tmp_path / 'old')
     path = tmp_path / 'old/metadata.yaml'
     root = yaml.safe_load(path.read_text(encoding='utf-8'))

@@ -74,7 +74,7 @@ def test_a_renamed_file_is_found_and_stands_in_its_place(folder, name):
     check(folder, COUNTS, *expected)
 
 
-def test_several_renamed_files_are_told_by_their_content(folder):
+def test_several_renamed_files_are_recognised_by_their_content(folder):
     # Counts alone do not tell them apart.
     for number, name in enumerate('dcba'):
         (folder / f'bag_{number}.mcap').rename(folder / f'{name}.mcap')
@@ -108,7 +108,7 @@ def test_a_hole_in_the_numbers_is_named_where_metadata_is_gone(folder):
     check(folder, COUNTS[:2], 'bag_1.mcap: the file is missing, and so are the following')
 
 
-def test_a_hole_behind_what_metadata_tells_of_is_named(folder):
+def test_a_hole_behind_the_files_that_metadata_lists_is_named(folder):
     """The recorder was killed, then a file was lost."""
     path = folder / 'metadata.yaml'
     root = yaml.safe_load(path.read_text(encoding='utf-8'))
@@ -176,10 +176,10 @@ def test_compressed_files_are_read_and_repaired(folder, numbers, listed, ending)
     compress_files(folder, numbers, ending)
     path = folder / 'metadata.yaml'
     root = yaml.safe_load(path.read_text(encoding='utf-8'))
-    told = root['rosbag2_bagfile_information']
-    told |= {'compression_mode': 'FILE', 'compression_format': 'zstd'}
+    about = root['rosbag2_bagfile_information']
+    about |= {'compression_mode': 'FILE', 'compression_format': 'zstd'}
     if listed == 'packed':  # `files` keeps the names without the ending in some versions
-        told['relative_file_paths'] = [f'bag_{n}.mcap{ending}' for n in range(4)]
+        about['relative_file_paths'] = [f'bag_{n}.mcap{ending}' for n in range(4)]
     path.write_text(yaml.safe_dump(root, sort_keys=False), encoding='utf-8')
     if listed == 'no metadata':
         path.unlink()

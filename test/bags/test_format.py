@@ -1,4 +1,4 @@
-"""A bag is laid out as rosbag2 Jazzy lays it out, and strangers read every message of it."""
+"""A bag is laid out as rosbag2 Jazzy lays it out, and other readers read every message of it."""
 
 import json
 from pathlib import Path
@@ -93,20 +93,20 @@ def test_files_are_named_after_the_folder(folder):
 def test_metadata_has_every_field_in_its_order_and_type(folder):
     root = yaml.safe_load((folder / 'metadata.yaml').read_text(encoding='utf-8'))
     assert list(root) == ['rosbag2_bagfile_information']
-    told = root['rosbag2_bagfile_information']
-    assert list(told) == FIELDS
-    assert told['version'] == 9
-    assert told['storage_identifier'] == 'mcap'
-    assert told['starting_time'] == {'nanoseconds_since_epoch': START}
-    assert told['duration'] == {'nanoseconds': (COUNT - 1) * STEP}
-    assert told['message_count'] == COUNT + COUNT // 10
-    assert told['compression_format'] == told['compression_mode'] == ''
-    assert told['relative_file_paths'] == ['throw 1_0.mcap', 'throw 1_1.mcap']
-    assert told['custom_data'] == {'drops': '0', 'note': 'a: "b"\n\tü'}
-    assert told['ros_distro'] == 'jazzy'
+    about = root['rosbag2_bagfile_information']
+    assert list(about) == FIELDS
+    assert about['version'] == 9
+    assert about['storage_identifier'] == 'mcap'
+    assert about['starting_time'] == {'nanoseconds_since_epoch': START}
+    assert about['duration'] == {'nanoseconds': (COUNT - 1) * STEP}
+    assert about['message_count'] == COUNT + COUNT // 10
+    assert about['compression_format'] == about['compression_mode'] == ''
+    assert about['relative_file_paths'] == ['throw 1_0.mcap', 'throw 1_1.mcap']
+    assert about['custom_data'] == {'drops': '0', 'note': 'a: "b"\n\tü'}
+    assert about['ros_distro'] == 'jazzy'
 
 
-def test_metadata_tells_of_each_topic(folder):
+def test_metadata_describes_each_topic(folder):
     root = yaml.safe_load((folder / 'metadata.yaml').read_text(encoding='utf-8'))
     topics = root['rosbag2_bagfile_information']['topics_with_message_count']
     assert [t['message_count'] for t in topics] == [COUNT, COUNT // 10, 0]
@@ -127,7 +127,7 @@ def test_metadata_tells_of_each_topic(folder):
     assert topics[2]['topic_metadata']['offered_qos_profiles'] == []
 
 
-def test_metadata_tells_of_each_file(folder):
+def test_metadata_describes_each_file(folder):
     root = yaml.safe_load((folder / 'metadata.yaml').read_text(encoding='utf-8'))
     assert root['rosbag2_bagfile_information']['files'] == [
         {
@@ -149,11 +149,11 @@ def test_a_bag_without_messages_has_the_times_of_rosbag2(tmp_path):
     with BagWriter(tmp_path / 'bag') as bag:
         bag.add(topic('/odom', ODOMETRY))
     root = yaml.safe_load((tmp_path / 'bag/metadata.yaml').read_text(encoding='utf-8'))
-    told = root['rosbag2_bagfile_information']
-    assert told['starting_time'] == {'nanoseconds_since_epoch': 2**63 - 1}
-    assert told['duration'] == {'nanoseconds': 0}
-    assert told['custom_data'] is None
-    assert told['ros_distro'] == ''  # not known
+    about = root['rosbag2_bagfile_information']
+    assert about['starting_time'] == {'nanoseconds_since_epoch': 2**63 - 1}
+    assert about['duration'] == {'nanoseconds': 0}
+    assert about['custom_data'] is None
+    assert about['ros_distro'] == ''  # not known
     found = open_bag(tmp_path / 'bag')
     assert (found.complete, found.message_count, found.start, found.end) == (True, 0, 0, 0)
 
@@ -201,8 +201,8 @@ def test_header_metadata_channels_and_schemas_say_what_rosbag2_says(folder):
     for record in (opened, closed):
         assert record.name == 'rosbag2'
         assert list(record.metadata) == ['serialized_metadata']
-        told = yaml.safe_load(record.metadata['serialized_metadata'])
-        assert list(told) == FIELDS  # without the root, or rosbag2 plays nothing
+        about = yaml.safe_load(record.metadata['serialized_metadata'])
+        assert list(about) == FIELDS  # without the root, or rosbag2 plays nothing
     channel = next(r for r in found if isinstance(r, records.Channel) and r.topic == '/odom')
     assert channel.message_encoding == 'cdr'
     assert channel.metadata == {
@@ -243,9 +243,9 @@ def test_a_type_that_is_not_installed_has_a_schema_without_text(tmp_path):
         bag.write(odd, b'\0\1\0\0\0', 1, 1)
         bag.write(empty, b'\0\1\0\0\0', 2, 2)
     found = raw_records(tmp_path / 'bag/bag_0.mcap')
-    told = {r.name: (r.encoding, r.data) for r in found if isinstance(r, records.Schema)}
+    about = {r.name: (r.encoding, r.data) for r in found if isinstance(r, records.Schema)}
     # No encoding: no definition is there. An empty text defines a message without fields.
-    assert told == {'odd_msgs/msg/Odd': ('', b''), 'std_msgs/msg/Empty': ('ros2msg', b'')}
+    assert about == {'odd_msgs/msg/Odd': ('', b''), 'std_msgs/msg/Empty': ('ros2msg', b'')}
     assert [m.type for m in open_bag(tmp_path / 'bag').messages(['/empty'])] == [
         'std_msgs/msg/Empty'
     ]
@@ -344,7 +344,7 @@ def test_qos_of_bags_before_jazzy_is_understood():
     )
 
 
-# ---- strangers ----
+# ---- other readers ----
 
 
 def test_rosbags_reads_every_message(folder):

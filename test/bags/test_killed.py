@@ -42,11 +42,11 @@ def test_a_killed_writer_loses_at_most_a_second(tmp_path):
         children = [start(folder, max_size) for folder, max_size in pair]
         try:
             for folder, _ in pair:
-                wait_for(lambda folder=folder: told(folder) > 0)
+                wait_for(lambda folder=folder: counted(folder) > 0)
             until = time.monotonic() + float(rng.uniform(0.0, 0.9))
             while time.monotonic() < until:  # at any moment it is whole
                 for folder, _ in pair:
-                    told(folder)
+                    counted(folder)
         finally:
             for child in children:
                 child.kill()
@@ -66,8 +66,8 @@ def test_a_killed_writer_loses_at_most_a_second(tmp_path):
             assert everything(made) == got
 
 
-def told(folder: Path) -> int:
-    """How many messages metadata.yaml tells of; it can be read at any moment."""
+def counted(folder: Path) -> int:
+    """The messages that metadata.yaml counts; it can be read at any moment."""
     try:
         text = (folder / 'metadata.yaml').read_text(encoding='utf-8')
     except FileNotFoundError:  # not started yet
@@ -113,7 +113,7 @@ def test_a_full_disk_leaves_a_whole_bag(small_disk, max_size):
     assert found.message_count == bag.message_count
     assert bag.message_count + bag.lost == len(written) + 1
     assert found.message_count > 2000  # of 3 MB, 725 bytes each, most is used
-    assert told(small_disk / 'bag') == found.message_count
+    assert counted(small_disk / 'bag') == found.message_count
 
 
 def test_the_disk_is_full_from_the_start(small_disk):
@@ -155,7 +155,7 @@ print(bag.message_count)
     found = open_bag(tmp_path / 'bag')
     assert found.message_count == int(count) > 0  # all but the chunk that found no room
     assert [m[2] for m in everything(found)] == list(range(int(count)))
-    assert told(tmp_path / 'bag') == int(count)
+    assert counted(tmp_path / 'bag') == int(count)
 
 
 def test_a_folder_that_goes_away_is_named(tmp_path):

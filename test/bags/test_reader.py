@@ -126,18 +126,18 @@ def test_a_folder_without_metadata_is_read_in_the_order_of_its_numbers(tmp_path)
     assert found.message_count == 9
 
 
-def test_a_file_that_metadata_does_not_tell_of_yet_is_read(tmp_path):
+def test_a_file_that_metadata_does_not_list_yet_is_read(tmp_path):
     """The recorder was killed between the new file and its metadata."""
     bag = write_bag(tmp_path / 'bag', 300, split_at=(200,))
     path = tmp_path / 'bag/metadata.yaml'
     root = yaml.safe_load(path.read_text(encoding='utf-8'))
-    told = root['rosbag2_bagfile_information']
+    about = root['rosbag2_bagfile_information']
     for key in ('files', 'relative_file_paths'):
-        told[key] = told[key][:1]
-    told['message_count'] = 220
+        about[key] = about[key][:1]
+    about['message_count'] = 220
     path.write_text(yaml.safe_dump(root, sort_keys=False), encoding='utf-8')
     assert open_bag(tmp_path / 'bag').files == bag.files
-    assert not open_bag(tmp_path / 'bag').complete  # metadata.yaml tells of 220
+    assert not open_bag(tmp_path / 'bag').complete  # metadata.yaml counts 220
     assert open_bag(tmp_path / 'bag').message_count == 330
 
 

@@ -83,16 +83,16 @@ def test_all_of_a_killed_bag_is_kept(killed, tmp_path, foxglove):
 
 
 def test_a_bag_without_metadata_gets_it_back(killed, tmp_path):
-    told = yaml.safe_load((killed / 'metadata.yaml').read_text(encoding='utf-8'))
+    before = yaml.safe_load((killed / 'metadata.yaml').read_text(encoding='utf-8'))
     (killed / 'metadata.yaml').unlink()
     repair(killed, tmp_path / 'killed 2')
     again = yaml.safe_load((tmp_path / 'killed 2/metadata.yaml').read_text(encoding='utf-8'))
-    for root in (told, again):
+    for root in (before, again):
         about = root['rosbag2_bagfile_information']
         for file in about['files']:
             file['path'] = ''
         about['relative_file_paths'] = []
-    assert again == told
+    assert again == before
 
 
 def test_the_repair_of_a_repaired_bag_changes_nothing(killed, tmp_path):
@@ -104,7 +104,7 @@ def test_the_repair_of_a_repaired_bag_changes_nothing(killed, tmp_path):
         assert once.read_bytes() == twice.read_bytes()
 
 
-def test_sequences_notes_and_other_encodings_of_strangers_are_kept(tmp_path):
+def test_sequences_metadata_and_encodings_of_other_recorders_are_kept(tmp_path):
     with (tmp_path / 'x.mcap').open('wb') as file:
         writer = Writer(file)
         writer.start('', 'others')
@@ -173,7 +173,7 @@ def test_the_program_says_what_it_kept_and_lost(killed, tmp_path):
     assert done.stdout.count('lost') == 1
 
 
-def test_the_program_speaks_json(killed, tmp_path):
+def test_the_program_prints_json(killed, tmp_path):
     done = run(killed, tmp_path / 'made', '--json')
     assert done.returncode == 0
     assert json.loads(done.stdout) == {
@@ -247,7 +247,7 @@ def test_ctrl_c_leaves_no_half_bag(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ['big']
 
 
-def test_a_full_disk_is_told(tmp_path):
+def test_a_full_disk_is_reported(tmp_path):
     write_bag(tmp_path / 'bag', 2000)
     code = (
         'import resource, sys\n'

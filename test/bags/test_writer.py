@@ -162,7 +162,7 @@ def test_a_publisher_that_comes_later_is_kept_where_no_reader_stumbles_over_it(t
         assert open_bag(tmp_path / folder).topics[0].topic.qos == (first, second)
 
 
-def test_attachments_are_read_back_by_strangers(tmp_path, foxglove):
+def test_attachments_are_read_back_by_foxglove(tmp_path, foxglove):
     with BagWriter(tmp_path / 'bag') as bag:
         odom = bag.add(topic('/odom', ODOMETRY))
         bag.write(odom, ODOMETRIES[0], 1, 1)
