@@ -13,7 +13,7 @@ from std_msgs.msg import Float64, String
 from visualization_msgs.msg import MarkerArray
 
 from disc_sim_ros import topics
-from disc_sim_ros.physics import frames as paper_frames
+from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.ros import messages, qos
 from disc_sim_ros.ros.cdr_template import CdrTemplate
@@ -222,7 +222,7 @@ class Publishers:
         """
         L, M, N, axes_of_moment = moment
         pack = self._moments[axes_of_moment].pack
-        self.applied_moment.publish(pack(*stamp(nanoseconds), *paper_frames.flip_yz((L, M, N))))
+        self.applied_moment.publish(pack(*stamp(nanoseconds), *flip_yz((L, M, N))))
 
     def publish_applied_coefficients(self, nanoseconds: int, values: tuple[float, ...]) -> None:
         """Publish coefficients that act from a stamp on, in the paper's signs."""

@@ -1,7 +1,6 @@
 """The services of sim_node: each asks the simulation thread to act and answers with the result."""
 
 from collections.abc import Callable
-from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Any
 
 from rclpy.node import Node
@@ -21,7 +20,7 @@ def create_services(node: Node, loop: SimLoop) -> None:
         try:
             response.message = future.result(PATIENCE)
             response.success = True
-        except FutureTimeoutError:
+        except TimeoutError:
             future.cancel()
             response.message = f'the simulation did not answer within {PATIENCE:g} s'
         except DiscSimError as error:
