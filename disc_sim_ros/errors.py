@@ -45,6 +45,10 @@ class IntegrationError(DiscSimError, ArithmeticError):
     """A flight left the range of numbers that the integration can follow."""
 
 
+class InterruptedSweepError(DiscSimError):
+    """A worker died. Finished flights are kept, and a resumed run continues from them."""
+
+
 class BagError(DiscSimError):
     """A bag cannot be written, read or repaired; the message says which bag, where and why."""
 

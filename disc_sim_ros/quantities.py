@@ -252,7 +252,20 @@ IMU = _table(
     ),
 )  # fmt: skip
 
-# Limits of the files of a bag.
+# The files of a bag: of bags.writer.BagWriter, and of recorder_node, where 0 is no limit.
+BAG_FILES = _table(
+    Quantity(
+        'file_size', 'bytes', 1024, 2**62, None, 'Size at which the next file of the bag begins',
+        whole=True,
+    ),
+    Quantity(
+        'file_duration', 's', 1e-3, 1e9, None, 'Time after which the next file of the bag begins'
+    ),
+    Quantity(
+        'flush_period', 's', 1e-3, 3600.0, 0.5,
+        'Longest time that a message waits for the disk; a power failure may cost as much',
+    ),
+)  # fmt: skip
 RECORDING = _table(
     Quantity(
         'max_size', 'MiB', 0, 1_000_000, 0,
@@ -262,10 +275,7 @@ RECORDING = _table(
         'max_duration', 's', 0.0, 31_536_000.0, 0.0,
         'Time after which the next file of the bag begins; 0: never',
     ),
-    Quantity(
-        'flush_period', 's', 0.01, 60.0, 0.5,
-        'Longest time that a message waits for the disk; a power failure may cost as much',
-    ),
+    BAG_FILES['flush_period'].within(0.01, 60.0),
 )  # fmt: skip
 
 # Ensembles.
@@ -290,6 +300,7 @@ QUANTITIES = {
     **TIMING,
     **IMU,
     **RECORDING,
+    **BAG_FILES,
     **STUDY,
     **_table(POSITION, VELOCITY, ORIENTATION, STEP, DURATION, SAMPLE_RATE),
 }

@@ -1,4 +1,4 @@
-"""What the recorded examples share: a simulator and a recorder, one throw, a bag and a plot."""
+"""Shared by the recorded examples: a simulator and a recorder, one throw, a bag and a plot."""
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping
@@ -23,12 +23,12 @@ from disc_sim_ros import topics
 from disc_sim_ros.cli.arguments import number
 from disc_sim_ros.ros import client, processes, qos
 
-PATIENCE = 30.0  # s, for the simulator to be found and to answer
+PATIENCE = 30.0  # s, for the discovery of the simulator and for its answer
 ENDS = ('landed', 'failed', 'reset')
 
 
 class Flier(Node):
-    """Throws the disc through a service and says how the flight ended."""
+    """Throws the disc through a service and returns the end of the flight."""
 
     def __init__(self, name: str, context: Context) -> None:
         super().__init__(name, context=context)
@@ -41,12 +41,15 @@ class Flier(Node):
         self._service = self.create_client(Trigger, 'sim_node/throw')
 
     def is_ready(self) -> bool:
-        """Say whether the simulator can be thrown and heard; subclasses add what they need."""
-        heard = self.count_publishers(topics.FLIGHT_EVENTS) > 0
-        return heard and self._service.service_is_ready()
+        """Return True if the simulator is discovered; subclasses add their own conditions."""
+        publishers = self.count_publishers(topics.FLIGHT_EVENTS)
+        return publishers > 0 and self._service.service_is_ready()
 
     def fly(self, longest: float = 60.0) -> dict[str, str]:
-        """Throw, spin until the end of the flight, and return where the disc landed.
+        """Throw, spin until the end of the flight, and return the values of the landing.
+
+        Args:
+            longest: Longest time to wait for the end [s].
 
         Raises:
             RuntimeError: The simulator does not throw, or the flight does not end on the ground.
@@ -63,7 +66,7 @@ class Flier(Node):
         return {pair.key: pair.value for pair in self.ended.values}
 
     def spin_until(self, condition: Callable[[], object], patience: float = math.inf) -> bool:
-        """Take messages until a condition holds; say whether it did within `patience` [s]."""
+        """Take messages until a condition holds; return False after `patience` [s]."""
         end = time.monotonic() + patience
         while not condition() and time.monotonic() < end:
             self._spinner.spin_once(0.1)
@@ -76,10 +79,10 @@ class Flier(Node):
 
 @contextmanager
 def recorded(parameters: Mapping[str, object], bag: Path, pace: float) -> Iterator[Context]:
-    """Start sim_node and recorder_node by themselves; yield a context to make nodes in.
+    """Start sim_node and recorder_node in a ROS domain of their own; yield a context for nodes.
 
     Args:
-        parameters: Of sim_node.
+        parameters: Parameters of sim_node.
         bag: New folder for the recording.
         pace: Simulated seconds a second.
 
@@ -109,7 +112,7 @@ def recorded(parameters: Mapping[str, object], bag: Path, pace: float) -> Iterat
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add where bag and plot go, and how fast the time of the simulation passes."""
+    """Add the folder for bag and plot, and the pace of the simulated time."""
     parser.add_argument(
         '--pace',
         type=number(0.01, 10.0, ''),
@@ -132,9 +135,9 @@ def folder_of(options: argparse.Namespace, name: str) -> Path:
 
 
 def show(folder: Path) -> None:
-    """Print what is in the bag, and draw it."""
+    """Print the contents of the bag, and plot the flight."""
     analyse_bag = [sys.executable, '-m', 'disc_sim_ros.cli.analyse_bag']
     image = folder / 'flight.png'
-    subprocess.run(  # noqa: S603 - our own program
+    subprocess.run(  # noqa: S603 - a program of this package
         [*analyse_bag, str(folder / 'bag'), '--verify', '--plot', str(image)], check=True
     )

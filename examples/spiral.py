@@ -3,9 +3,10 @@
     .venv/bin/python examples/spiral.py turn
     .venv/bin/python examples/spiral.py roll
 
-A constant rolling moment, C_L = 0.1, holds the nose of a spinning disc up: banked, it turns and
-turns (Fig. 11). A constant pitching moment, C_M = 0.2, rolls it on and on (Fig. 12). The node
-renews its command on `cmd_coefficients`, as a controller on another machine would.
+A constant rolling moment, C_L = 0.1, holds the nose of a spinning disc up: a banked disc flies a
+turn without end (Fig. 11). A constant pitching moment, C_M = 0.2, rolls the disc without end
+(Fig. 12). The node renews its command on `cmd_coefficients`, as a controller on another machine
+would.
 """
 
 import argparse
@@ -16,9 +17,8 @@ import sys
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from rclpy.context import Context
 
+from disc_sim_ros import DiscSimError, load_disc
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.theory import spin_rate
 from disc_sim_ros.ros.qos import COMMAND_QOS, STATE_QOS
 from disc_sim_ros.topics import APPLIED_COEFFICIENTS, CMD_COEFFICIENTS
@@ -26,12 +26,12 @@ import session
 from session import Flier
 
 RATE = 50.0  # Hz
-TIMEOUT = 10.0  # s of simulated time; the paper's moment is constant, however late a renewal is
+TIMEOUT = 10.0  # s of simulated time; the paper's moment is constant even if a renewal is late
 
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A launch with a held command, as the caption of a figure gives it."""
+    """A launch with a constant command, from the caption of a figure."""
 
     command: tuple[float, float, float]  # C_L, C_M, C_N
     advance_ratio: float
@@ -67,13 +67,13 @@ class Commander(Flier):
         self.create_timer(1.0 / RATE, lambda: self._publisher.publish(self._message))
 
     def is_ready(self) -> bool:
-        """Say whether our command acts already: then it does so from the release on."""
+        """Return True if the command acts already, so that it acts from the release on."""
         return super().is_ready() and self._message.vector in [m.vector for m in self._applied]
 
 
 def parameters(manoeuvre: Manoeuvre) -> dict[str, object]:
-    """Return the parameters of a sim_node that throws so."""
-    diameter = disc_file.load_disc('frisbee').diameter
+    """Return the parameters of sim_node for the launch of a manoeuvre."""
+    diameter = load_disc('frisbee').diameter
     spin = spin_rate(manoeuvre.advance_ratio, diameter, manoeuvre.launch['speed'])
     launch = {**manoeuvre.launch, 'spin': spin}
     return {f'launch.{name}': value for name, value in launch.items()} | {

@@ -3,8 +3,8 @@
     .venv/bin/sim_node --ros-args -p auto_throw:=false
     .venv/bin/python examples/steer.py --command 0 0.005 0
 
-The three numbers are the paper's C_L, C_M, C_N. A disc that spins clockwise gives way to a push at
-right angles: C_M > 0, nose up, rolls it to the left.
+The three numbers are the paper's C_L, C_M, C_N. A spinning disc turns at right angles to a moment:
+with clockwise spin, C_M > 0 (nose up) rolls it to the left.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
-PATIENCE = 30.0  # s, for the simulator to be found and to answer
+PATIENCE = 30.0  # s, for the discovery of the simulator and for its answer
 RATE = 50.0  # Hz; a command that is not renewed for command_timeout, 0.5 s, falls to zero
 
 
@@ -32,13 +32,13 @@ class Steerer(Node):
         super().__init__('steerer')
         self._ends: list[DiagnosticStatus] = []
         self._command = self.create_publisher(Vector3Stamped, 'cmd_coefficients', 10)
-        # Before the client: the simulator learns of both in this order, and so who has an answer
-        # of the service gets the events after it as well.
+        # Before the client: the simulator discovers both in this order, so that a node with an
+        # answer of the service also gets the later events.
         self.create_subscription(DiagnosticStatus, 'flight_events', self._on_event, 100)
         self._throw = self.create_client(Trigger, 'sim_node/throw')
 
     def simulator_is_there(self) -> bool:
-        """Say whether somebody takes our commands, throws and tells of flights."""
+        """Return True if a simulator takes commands, throws and publishes events."""
         return bool(
             self._command.get_subscription_count()
             and self._throw.service_is_ready()
@@ -52,7 +52,7 @@ class Steerer(Node):
             RuntimeError: The simulator does not throw, or the flight does not end on the ground.
         """
         message = Vector3Stamped(vector=Vector3(**dict(zip('xyz', command, strict=True))))
-        self._command.publish(message)  # the stamp 0: at the next step, so before the throw
+        self._command.publish(message)  # stamp 0: acts at the next step, before the throw
         timer = self.create_timer(1.0 / RATE, lambda: self._command.publish(message))
         self._ends.clear()
         thrown = self._throw.call_async(Trigger.Request())
@@ -61,11 +61,11 @@ class Steerer(Node):
         self.spin_until(lambda: self._ends)
         self.destroy_timer(timer)
         if not self._ends[0].name.endswith(': landed'):
-            raise RuntimeError(f'the flight ended otherwise: {self._ends[0].message}')
+            raise RuntimeError(f'the flight did not end on the ground: {self._ends[0].message}')
         return {pair.key: pair.value for pair in self._ends[0].values}
 
     def spin_until(self, condition: Callable[[], object], patience: float = math.inf) -> bool:
-        """Take messages until a condition holds; say whether it did within `patience` [s]."""
+        """Take messages until a condition holds; return False after `patience` [s]."""
         end = time.monotonic() + patience
         while not condition() and time.monotonic() < end:
             rclpy.spin_once(self, timeout_sec=0.1)
@@ -73,7 +73,7 @@ class Steerer(Node):
 
     def _on_event(self, event: DiagnosticStatus) -> None:
         if event.name.endswith(': thrown'):
-            self._ends.clear()  # of a disc that was in the air before
+            self._ends.clear()  # the end of an earlier flight
         if event.name.endswith((': landed', ': failed', ': reset')):
             self._ends.append(event)
 
@@ -96,7 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Fly without and with the command; return 0 after two landings."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options = parse(remove_ros_args(['steer', *arguments])[1:])
-    # Python's own handling of Ctrl-C: that of rclpy ends the context below a running spin_once.
+    # Python's handling of Ctrl-C: that of rclpy shuts down the context during spin_once.
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node = Steerer()
     try:

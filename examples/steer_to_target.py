@@ -2,9 +2,10 @@
 
     .venv/bin/python examples/steer_to_target.py --target 26 0 --roll 10 --wind 0 -3 0
 
-Fifty times a second the pilot asks where the disc would land, and changes its plan so that this
-is the target. The plan is two pairs of the paper's C_L and C_M, one for now, one for later. It
-knows the disc but not the wind: that it feels from how it is pushed off the expected flight.
+Fifty times a second the pilot computes the landing of the disc and changes its plan to bring the
+landing to the target. The plan is two pairs of the paper's C_L and C_M, one for now and one for
+later. The pilot knows the disc but not the wind, which it estimates from the deviation of the disc
+from the expected flight.
 """
 
 import argparse
@@ -20,16 +21,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 import yaml
 
+from disc_sim_ros import Control, Disc, DiscSimError, FlightSimulator, Setup, State, Wind, fly
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.cli import flags
 from disc_sim_ros.cli.arguments import Parser
-from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics import disc_file, frames
-from disc_sim_ros.physics.disc import Disc
-from disc_sim_ros.physics.environment import Wind
-from disc_sim_ros.physics.flight import Setup, fly
-from disc_sim_ros.physics.kernels.equations import Control, State
-from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.ros.messages import release_from_odometry
 from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS
 from disc_sim_ros.topics import CMD_COEFFICIENTS, CONFIGURATION, ODOM, Frames
@@ -38,21 +34,21 @@ from session import Flier
 
 PERIOD = 0.02  # s, between two plans
 LIMIT = 0.05  # of C_L and C_M; the paper's spiral turn takes 0.1
-FIRST_LEG = 1.2  # s after the release the second pair takes over; later it does so LAST_LEG ahead
-LAST_LEG = 0.3  # s
-PROBE = 2e-4  # change of a coefficient that shows what it does
-SCALE = 0.02  # coefficients of this size count like metres
+FIRST_LEG = 1.2  # s after the release the second pair takes over
+LAST_LEG = 0.3  # s; later, the second pair always lies this far ahead
+PROBE = 2e-4  # change of a coefficient for the numerical derivative
+SCALE = 0.02  # a coefficient of this size weighs as much as a metre
 DAMPING = (0.05, 0.5, 5.0)  # m^2: from a bold step to a cautious one
 GOOD_ENOUGH = 0.05  # m
 COARSE, FINE = 0.02, 0.005  # s, integration steps: to the landing, and between two plans
-WIND_SPREAD = 3.0  # m/s, before anything is felt
+WIND_SPREAD = 3.0  # m/s, before the first measurement
 WIND_DRIFT = 0.01  # m/s from one plan to the next
 VELOCITY_NOISE = 0.01  # m/s
-NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # the past steers nothing
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # old states are useless
 
 
-class WindSense:
-    """Estimates the horizontal wind by a Kalman filter on how the velocity changes.
+class WindEstimator:
+    """Estimates the horizontal wind by a Kalman filter on changes of the velocity.
 
     Attributes:
         wind: Estimate, earth axes (x forward, y right) [m/s], shape (2,).
@@ -63,8 +59,8 @@ class WindSense:
         self.wind = np.zeros(2)
         self._P = WIND_SPREAD**2 * np.eye(2)
 
-    def feel(self, before: State, command: FloatArray, seconds: float, after: State) -> None:
-        """Learn from two states and the command that was held between them."""
+    def update(self, before: State, command: FloatArray, seconds: float, after: State) -> None:
+        """Update the estimate from two states and the command that acted between them."""
         steps = round(seconds / FINE)
 
         def velocity(wind: FloatArray) -> FloatArray:
@@ -86,13 +82,13 @@ class Pilot:
 
     Attributes:
         plan: C_L, C_M for now and C_L, C_M for later, shape (4,).
-        expected: Where the disc would land by this plan, earth axes [m], shape (2,).
+        expected: Expected landing with this plan, earth axes [m], shape (2,).
     """
 
     def __init__(self, disc: Disc, target: FloatArray) -> None:
-        """Take the disc, and the target in earth axes (x forward, y right) [m], shape (2,)."""
+        """Plan for a disc and a target in earth axes (x forward, y right) [m], shape (2,)."""
         self._setup = Setup(disc=disc, step=COARSE)
-        self._sense = WindSense(disc)
+        self._estimator = WindEstimator(disc)
         self._target = target
         self._before: tuple[float, State] | None = None
         self.plan = np.zeros(4)
@@ -100,19 +96,19 @@ class Pilot:
 
     @property
     def wind(self) -> FloatArray:
-        """Return the wind as it feels, earth axes [m/s], shape (2,)."""
-        return self._sense.wind
+        """Return the estimated wind, earth axes [m/s], shape (2,)."""
+        return self._estimator.wind
 
     def command(self, time: float, s: State) -> FloatArray:
-        """Return C_L and C_M to hold from now on, shape (2,).
+        """Return C_L and C_M from now on, shape (2,).
 
         Args:
             time: Since the release [s].
-            s: State of the disc; its spin angle does not matter.
+            s: State of the disc; its spin angle has no effect.
         """
         if self._before is not None:
             then, state = self._before
-            self._sense.feel(state, self.plan[:2], time - then, s)
+            self._estimator.update(state, self.plan[:2], time - then, s)
             if then < FIRST_LEG <= time:
                 self.plan[:2] = self.plan[2:]
         self._before = (time, s)
@@ -121,7 +117,7 @@ class Pilot:
         return self.plan[:2]
 
     def _improve(self, s: State, leg: float) -> None:
-        """Take damped Gauss-Newton steps that bring the landing nearer."""
+        """Improve the plan by damped Gauss-Newton steps."""
         at = self._landing(s, leg, self.plan)
         for _ in range(2):
             miss = self._target - at
@@ -153,7 +149,7 @@ class Pilot:
 
 
 def simulator(setup: Setup, s: State, wind: FloatArray, command: FloatArray) -> FlightSimulator:
-    """Return a simulator that goes on from a state in a horizontal wind with a command."""
+    """Return a simulator that continues from a state in a horizontal wind with a command."""
     around = replace(setup, wind=Wind(mean=(float(wind[0]), float(wind[1]), 0.0)))
     sim = FlightSimulator(around, s)
     sim.control = Control(*command.tolist(), 0.0)
@@ -161,10 +157,10 @@ def simulator(setup: Setup, s: State, wind: FloatArray, command: FloatArray) -> 
 
 
 class Navigator(Flier):
-    """A node that flies a Pilot: odometry in, coefficients out.
+    """A node around a Pilot: odometry in, coefficients out.
 
     Attributes:
-        pilot: On board from the throw on.
+        pilot: Exists from the throw on.
     """
 
     def __init__(self, target: tuple[float, float], context: Context) -> None:
@@ -172,25 +168,25 @@ class Navigator(Flier):
         self.pilot: Pilot | None = None
         self._target = frames.paper_from_map((*target, 0.0))[:2]
         self._frames = Frames()
-        self._seen = False
+        self._received = False
         self._released = self._planned = 0  # ns
         self._command = self.create_publisher(Vector3Stamped, CMD_COEFFICIENTS, COMMAND_QOS)
         self.create_subscription(String, CONFIGURATION, self._on_throw, LATCHED_QOS)
         self.create_subscription(Odometry, ODOM, self._on_odometry, NEWEST)
 
     def is_ready(self) -> bool:
-        """Say whether the simulator hears us and we hear it."""
-        return super().is_ready() and self._command.get_subscription_count() > 0 and self._seen
+        """Return True if the simulator takes commands and its odometry arrives."""
+        return super().is_ready() and self._command.get_subscription_count() > 0 and self._received
 
     def _on_throw(self, configuration: String) -> None:
-        """Board the disc that was thrown: its properties come with the throw."""
+        """Make a pilot for the thrown disc, whose properties are published with the throw."""
         document = yaml.safe_load(configuration.data)
         disc = disc_file.disc_from_document(document['disc'], document['disc_file'])
         self.pilot = Pilot(disc, self._target)
         self._released = self._planned = 0
 
     def _on_odometry(self, odometry: Odometry) -> None:
-        self._seen = True
+        self._received = True
         speed = odometry.twist.twist.linear
         now = odometry.header.stamp.sec * 10**9 + odometry.header.stamp.nanosec
         at_rest = not (speed.x or speed.y or speed.z)
@@ -244,7 +240,7 @@ def main(arguments: list[str] | None = None) -> int:
     print(f'unsteered, it misses by {math.dist(unsteered[:2], options.target):.2f} m')
     print(f'steered, it lands at x {x:.2f} m, y {y:.2f} m', end=', ')
     print(f'{math.dist((x, y), options.target):.2f} m from the target')
-    print(f'the wind as it felt in the end: x {wind[0]:.2f} m/s, y {wind[1]:.2f} m/s')
+    print(f'the estimated wind at the end: x {wind[0]:.2f} m/s, y {wind[1]:.2f} m/s')
     return 0
 
 

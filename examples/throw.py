@@ -1,4 +1,4 @@
-"""Throw the disc from another node, as a robot arm would, and print what becomes of it.
+"""Throw the disc from another node, as a robot arm would, and print the events of the flight.
 
 Start a simulator that waits, then throw:
 
@@ -19,9 +19,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-PATIENCE = 30.0  # s, for the simulator to be found
-TO_THROW = 10.0  # s, for it to throw
-TO_BE_FOUND = 0.2  # s, for the simulator to find our subscription in turn, which we cannot see
+PATIENCE = 30.0  # s, for the discovery of the simulator
+TO_THROW = 10.0  # s, for the throw
+TO_BE_FOUND = 0.2  # s, for the simulator to discover this subscription, which cannot be observed
 ENDS = {'landed', 'failed', 'reset', 'thrown'}  # events that end a flight
 
 
@@ -29,7 +29,7 @@ class Thrower(Node):
     """Publishes a launch state on `throw` and follows `flight_events`.
 
     Attributes:
-        events: Names of the events since our throw, which is the first.
+        events: Names of the events since the throw of this node, which is the first.
     """
 
     def __init__(self) -> None:
@@ -39,20 +39,20 @@ class Thrower(Node):
         self.create_subscription(DiagnosticStatus, 'flight_events', self._on_event, 100)
 
     def simulator_is_there(self) -> bool:
-        """Say whether somebody takes our throw and tells of flights."""
+        """Return True if a simulator takes throws and publishes events."""
         takes_throws = self._throw.get_subscription_count() > 0
         return takes_throws and self.count_publishers('flight_events') > 0
 
     def throw(self, release: Odometry) -> None:
-        """Let the disc go now: with the stamp 0 there is nothing to wait for."""
+        """Release the disc now: the stamp 0 does not delay the throw."""
         self._throw.publish(release)
 
     def end_of_flight(self) -> str:
-        """Return the event that has ended the flight thrown last; empty as long as it flies."""
+        """Return the event that ended the flight; empty while the disc flies."""
         return next((event for event in self.events[1:] if event in ENDS), '')
 
     def spin_until(self, condition: Callable[[], object], patience: float = math.inf) -> bool:
-        """Take messages until a condition holds; say whether it did within `patience` [s]."""
+        """Take messages until a condition holds; return False after `patience` [s]."""
         end = time.monotonic() + patience
         while not condition() and time.monotonic() < end:
             rclpy.spin_once(self, timeout_sec=0.1)
@@ -61,7 +61,7 @@ class Thrower(Node):
     def _on_event(self, event: DiagnosticStatus) -> None:
         name = event.name.rpartition(': ')[2]  # of, say, 'red/sim_node: landed'
         values = {pair.key: pair.value for pair in event.values}
-        ours = name == 'thrown' and values['from'] == 'throw'  # not by itself, nor by a service
+        ours = name == 'thrown' and values['from'] == 'throw'  # not auto_throw, nor a service
         if self.events or ours:
             print(f'{name}: {event.message}', flush=True)
             self.events.append(name)
@@ -75,7 +75,7 @@ def release(options: argparse.Namespace) -> Odometry:
     q = message.pose.pose.orientation
     # About y left, nose up is negative; about z up, so is a turn to the right.
     q.x, q.y, q.z, q.w = quaternion(options.roll, -options.pitch, -options.yaw)
-    # In axes that tilt with the disc and do not spin: it flies along its own x axis.
+    # In axes that tilt with the disc and do not spin: the disc flies along its x axis.
     message.twist.twist.linear.x = options.speed
     message.twist.twist.angular.z = -options.spin
     return message
@@ -113,7 +113,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Throw once; return 0 after the landing, 1 if there is none."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options = parse(remove_ros_args(['throw', *arguments])[1:])
-    # Python's own handling of Ctrl-C: that of rclpy ends the context below a running spin_once.
+    # Python's handling of Ctrl-C: that of rclpy shuts down the context during spin_once.
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node = Thrower()
     try:
@@ -123,7 +123,7 @@ def main(arguments: list[str] | None = None) -> int:
         node.spin_until(lambda: False, TO_BE_FOUND)
         node.throw(release(options))
         if not node.spin_until(lambda: node.events, TO_THROW):
-            print('it did not throw: it is paused, or its log says why', file=sys.stderr)
+            print('it did not throw: it is paused, or its log has the reason', file=sys.stderr)
             return 1
         node.spin_until(node.end_of_flight)
         return 0 if node.end_of_flight() == 'landed' else 1

@@ -1,7 +1,7 @@
 """Start sim_node, and on demand RViz: ros2 launch disc_sim_ros sim.launch.py disc:=wraith.
 
-Every parameter of sim_node is an argument of the same name; --show-args lists them. One that is
-not given has the value in params_file.
+Every parameter of sim_node is an argument of the same name; --show-args lists them. A parameter
+without an argument has its value of params_file.
 """
 
 from pathlib import Path
@@ -26,7 +26,7 @@ ARGUMENTS = {
     'namespace': ('', 'Namespace of all nodes, such as red.'),
     'params_file': (
         str(SHARE / 'config/sim.yaml'),
-        'Parameter file of sim_node; what it leaves out has its default.',
+        'Parameter file of sim_node; parameters that are not in it have their defaults.',
     ),
     'rviz': ('false', 'Start RViz with rviz/disc.rviz.'),
     'robot_state_publisher': (
@@ -37,7 +37,7 @@ ARGUMENTS = {
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the arguments and what starts the nodes."""
+    """Return the arguments and the action that starts the nodes."""
     own = [
         DeclareLaunchArgument(name, default_value=default, description=text)
         for name, (default, text) in ARGUMENTS.items()
@@ -58,10 +58,10 @@ def description(spec: ParameterSpec) -> str:
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    """Return the nodes, for the arguments as they were given."""
+    """Return the nodes for the given arguments."""
     given = given_parameters(context.launch_configurations)
     namespace = LaunchConfiguration('namespace')
-    # Not for sim_node: it must not wait for the /clock that it supplies.
+    # Not for sim_node, which must not wait for its own /clock.
     sim_time = {'use_sim_time': given.get('publish_clock', False)}
     return [
         Node(
@@ -85,7 +85,7 @@ def nodes(context: LaunchContext) -> list[Node]:
             executable='robot_state_publisher',
             namespace=namespace,
             parameters=[sim_time, robot_description(given.get('frame_prefix', ''))],
-            # sim_node itself sends disc to disc_body on /tf, and two senders are one too many.
+            # sim_node itself sends disc to disc_body on /tf, which must have one sender only.
             remappings=[(topics.TF, 'robot_state_publisher/tf')],
             condition=IfCondition(LaunchConfiguration('robot_state_publisher')),
         ),
@@ -93,7 +93,7 @@ def nodes(context: LaunchContext) -> list[Node]:
 
 
 def given_parameters(arguments: dict[str, str]) -> dict[str, Any]:
-    """Return the parameters of sim_node that were given as arguments, read as YAML."""
+    """Return the parameters of sim_node that are given as arguments, read as YAML."""
     given = {spec.name: arguments[spec.name] for spec in TABLE}
     return {name: yaml.safe_load(text) for name, text in given.items() if text != NOT_GIVEN}
 

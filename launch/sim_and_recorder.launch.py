@@ -1,8 +1,8 @@
-"""Start sim_node and a recorder, and throw once the recorder listens.
+"""Start sim_node and a recorder, and throw when the recorder has subscribed.
 
 ros2 launch disc_sim_ros sim_and_recorder.launch.py bag:=my_bag launch.speed:=20
 
-It takes all arguments of sim.launch.py but auto_throw. The bag holds every topic, as MCAP.
+It takes all arguments of sim.launch.py except auto_throw. The bag holds every topic, as MCAP.
 """
 
 from pathlib import Path
@@ -19,11 +19,11 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
 ARGUMENTS = {
-    'bag': ('', 'Folder of the bag, which must not exist; empty: bags/disc_ and the time, here.'),
+    'bag': ('', 'New folder for the bag; empty: bags/disc_DATE_TIME in the current folder.'),
     'throw_after': (
         '3.0',
-        'Wait this long before the throw, so that the recorder has found all topics. Unit: s. '
-        'Negative: do not throw.',
+        'Time before the throw, in which the recorder subscribes to all topics. Unit: s. '
+        'Negative: no throw.',
     ),
 }
 
@@ -42,7 +42,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def record_and_throw(context: LaunchContext) -> list[Node | TimerAction]:
-    """Return the recorder and, later, the call that throws."""
+    """Return the recorder and the delayed call of the throw."""
     arguments = context.launch_configurations
     recorder = Node(
         package='disc_sim_ros',

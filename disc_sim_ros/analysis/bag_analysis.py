@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 import math
+from pathlib import Path
 import re
 
 import numpy as np
 
 from disc_sim_ros import topics
+from disc_sim_ros.analysis import flights, recording
 from disc_sim_ros.analysis.checks import (
     Check,
     Stamps,
@@ -20,6 +22,7 @@ from disc_sim_ros.analysis.checks import (
 from disc_sim_ros.analysis.recording import Flight
 from disc_sim_ros.analysis.resimulate import Reflight, Verdict, compare, fly_again
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.bags.reader import Bag, open_bag
 from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight_config import Key, landing_from
@@ -86,6 +89,25 @@ class Analysis:
         if self.verdict is not None:
             return self.verdict.exact
         return all(check.passed for check in self.checks)
+
+
+def analyse_bag(path: Path | str, topic: str | None = None) -> list[Analysis]:
+    """Analyse every flight in a bag, disc by disc.
+
+    Args:
+        path: Folder of the bag, or one .mcap file.
+        topic: The topic with the motion; None for every nav_msgs/Odometry.
+
+    Raises:
+        BagError: The bag cannot be read, or has no such topic.
+    """
+    bag = open_bag(path)
+    doubts = doubts_of(bag)
+    return [
+        analyse(flight, doubts)
+        for disc in recording.discs(bag, topic)
+        for flight in flights.flights(disc)
+    ]
 
 
 def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
@@ -161,6 +183,14 @@ def _landing(flight: Flight, exact: Reflight | None) -> Touchdown | None:
         before = max(int(np.searchsorted(flight.time, time)) - 1, 0)
         spin = frames.flip(float(flight.motion.numbers[before, 12]))
     return Touchdown(time, float(place[0]), float(place[1]), spin)
+
+
+def doubts_of(bag: Bag) -> tuple[str, ...]:
+    """Return the reasons why messages may be missing from a bag."""
+    doubts = [f'{key}: {value}' for key, value in losses(bag.custom_data)]
+    if not bag.complete:
+        doubts.append('the bag was not closed or is damaged')
+    return tuple(doubts)
 
 
 def losses(custom_data: Mapping[str, str]) -> list[tuple[str, str]]:

@@ -16,6 +16,7 @@ from disc_sim_ros.bags.mcap_writer import CHUNK_SIZE, COMPRESSIONS, new_attachme
 from disc_sim_ros.bags.metadata_builder import MetadataBuilder
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.errors import BagError, WriteError
+from disc_sim_ros.quantities import BAG_FILES
 
 if TYPE_CHECKING:
     from collections import deque
@@ -38,7 +39,7 @@ class BagWriter:
         folder: Path | str,
         *,
         compression: str = 'zstd',
-        flush_period: float = 0.5,
+        flush_period: float = BAG_FILES['flush_period'].default,
         max_size: int | None = None,
         max_duration: float | None = None,
         custom_data: Mapping[str, str] = {},
@@ -64,13 +65,13 @@ class BagWriter:
             BagError: The system refuses to write in it.
         """
         validation.choice('compression', compression, COMPRESSIONS)
-        self._period = validation.number('flush_period', flush_period, 1e-3, 3600.0, unit='s')
+        self._period = BAG_FILES['flush_period'].check(flush_period)
         self._max_size: float = math.inf
         if max_size is not None:
-            self._max_size = validation.whole_number('max_size', max_size, 1024, 2**62)
+            self._max_size = BAG_FILES['file_size'].check(max_size, 'max_size')
         self._max_duration: float = math.inf
         if max_duration is not None:
-            seconds = validation.number('max_duration', max_duration, 1e-3, 1e9, unit='s')
+            seconds = BAG_FILES['file_duration'].check(max_duration, 'max_duration')
             self._max_duration = round(seconds * 1e9)
         self.folder = files.new_folder('bag', Path(folder))
         self.lost = 0  # messages that a full disk cost

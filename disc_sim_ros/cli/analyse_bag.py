@@ -79,7 +79,7 @@ def _run(chosen: argparse.Namespace) -> int:
         output.note(chosen.prog, f'error: {error}')
         return BAD_INPUT
     discs = _chosen_discs(discs, getattr(chosen, 'disc', None))
-    doubts = _doubts(bag)
+    doubts = bag_analysis.doubts_of(bag)
     if not bag.complete:
         text = 'was not closed or is damaged; `repair_bag` makes a complete copy'
         output.note(chosen.prog, f'note: {chosen.bag} {text}')
@@ -116,16 +116,6 @@ def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
     if not chosen:
         raise ConfigError('--disc', name, f'choose from {", ".join(d.name for d in discs)}')
     return chosen
-
-
-def _doubts(bag: 'Bag') -> tuple[str, ...]:
-    """Return the reasons why messages may be missing from the bag."""
-    from disc_sim_ros.analysis.bag_analysis import losses  # noqa: PLC0415
-
-    doubts = [f'{key}: {value}' for key, value in losses(bag.custom_data)]
-    if not bag.complete:
-        doubts.append('the bag was not closed or is damaged')
-    return tuple(doubts)
 
 
 def _plot(name: str, bag: str, analyses: 'Sequence[Analysis]') -> None:

@@ -12,7 +12,7 @@ import tempfile
 from typing import TYPE_CHECKING, Self
 
 import disc_sim_ros
-from disc_sim_ros import __version__
+from disc_sim_ros import __version__, topics
 from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser, add_quantity
 from disc_sim_ros.cli.main import DIFFERENT, run_program
@@ -213,7 +213,7 @@ def _report(bag: Path, plot: Path) -> int:
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
 
     opened = open_bag(bag)
-    disc = recording.discs(opened, '/odom')[0]
+    disc = recording.discs(opened, f'/{topics.ODOM}')[0]
     analyses = [bag_analysis.analyse(f) for f in flights.flights(disc)]
     if not analyses:
         raise DiscSimError(f'{bag}: the bag does not hold the throw')

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError, InterruptedSweepError
 from disc_sim_ros.studies import tables
 from disc_sim_ros.studies.flying import fly_batch
 from disc_sim_ros.studies.storage import DEFAULT_BATCH, Parts
@@ -26,10 +26,6 @@ AHEAD = 8  # default of the most batches submitted at a time; 1 MB each
 
 Progress = Callable[[int, int], None]  # finished flights, all flights
 Result = Callable[[int, tables.Columns], None]
-
-
-class InterruptedSweepError(DiscSimError):
-    """A worker died. Finished flights are kept, and a resumed run continues from them."""
 
 
 def sweep(

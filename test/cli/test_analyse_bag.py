@@ -14,8 +14,11 @@ import pytest
 
 from analysis import foreign
 from analysis.foreign import START, Parabola
+import disc_sim_ros
+from disc_sim_ros.analysis import bag_report
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.cli import analyse_bag, fly
+from disc_sim_ros.errors import BagError
 
 EXECUTABLE = Path(sys.executable).with_name('analyse_bag')
 
@@ -96,6 +99,17 @@ def test_a_steered_flight_in_gusts_is_computed_again_to_the_bit(document, steere
     assert launch['speed_m_s'] == pytest.approx(14.0)
     assert launch['pitch_deg'] == pytest.approx(2.0)
     assert first['setup']['wind']['turbulence'] == 12.0
+
+
+def test_the_public_function_finds_the_flights_of_the_command(document, steered):
+    _, found = document(steered)
+    analyses = disc_sim_ros.analyse_bag(steered)
+    flights = [flight for disc in found['discs'] for flight in disc['flights']]
+    assert [bag_report.document(a)['range_m'] for a in analyses] == [f['range_m'] for f in flights]
+    assert [a.passed for a in analyses] == [True, True]
+    assert disc_sim_ros.analyse_bag(steered, '/odom')[0].verdict == analyses[0].verdict
+    with pytest.raises(BagError, match='/nowhere'):
+        disc_sim_ros.analyse_bag(steered, '/nowhere')
 
 
 def test_a_bag_that_ends_between_the_landing_and_the_message_that_shows_it(

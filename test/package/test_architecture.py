@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -85,3 +86,12 @@ def test_every_folder_is_under_the_rules():
     for folder in folders:
         assert f'{PACKAGE}.{folder}' in layers
         assert folder in MAY_TALK_ROS or f'{PACKAGE}.{folder}' in silent
+
+
+def test_every_root_module_is_under_the_rules():
+    modules = {path.stem for path in (ROOT / PACKAGE).glob('*.py')} - {'__init__'}
+    layers = re.findall(
+        r'[\w.]+', ' '.join(contracts()['one direction, down to the physics']['layers'])
+    )
+    silent = contracts()['only ros and cli know ROS']['source_modules']
+    assert {f'{PACKAGE}.{module}' for module in modules} <= set(layers) & set(silent)

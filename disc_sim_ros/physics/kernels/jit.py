@@ -6,13 +6,33 @@ Without numba, or with NUMBA_DISABLE_JIT=1, each decorator returns the plain Pyt
 same equations, some hundred times slower.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+import sys
 from typing import Any, TypeVar
 
+
+@contextmanager
+def _without_scipy() -> Iterator[None]:
+    """Let the block import numba, which imports scipy only to check its version, without scipy.
+
+    `from disc_sim_ros import fly` then does not import scipy, which flights do not need.
+    """
+    if 'scipy' in sys.modules:
+        yield
+        return
+    sys.modules['scipy'] = None  # type: ignore[assignment]  # an import of it then fails
+    try:
+        yield
+    finally:
+        del sys.modules['scipy']
+
+
 try:
-    import numba
-    import numba.extending
+    with _without_scipy():
+        import numba
+        import numba.extending
 except ImportError as error:
     COMPILED = False
     NUMBA_ERROR = str(error)  # '' where numba can be imported

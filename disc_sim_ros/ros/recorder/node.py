@@ -176,7 +176,7 @@ class RecorderNode(Node):
             warn_once(f'there is another node {name}; both go on, each with its own bag')
         waiting = self._delivery.waiting
         if waiting:
-            warn_once(f'no /clock has come: {waiting} messages wait for the time', '/clock')
+            warn_once(f'no /clock has come: {waiting} messages wait for the time', topics.CLOCK)
         shift = self._delivery.clock.shift
         if shift:
             text = f'the wall clock was set by {shift * 1e-9:+.1f} s; log times go on without that'

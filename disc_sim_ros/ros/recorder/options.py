@@ -9,11 +9,11 @@ from typing import Any
 
 from disc_sim_ros.bags.mcap_writer import COMPRESSIONS
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.quantities import RECORDING
+from disc_sim_ros.quantities import BAG_FILES, RECORDING
 from disc_sim_ros.ros.parameter_spec import ParameterSpec, checked, spec_of
 
 _MIB = 1024 * 1024
-_SHORTEST_FILE = 1e-3  # s
+_SHORTEST_FILE = BAG_FILES['file_duration'].lowest  # s
 
 RECORDER_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
     'Bag': (

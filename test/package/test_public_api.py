@@ -1,0 +1,108 @@
+"""The public names of the package, and what an import of them loads."""
+
+import ast
+import importlib
+import json
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+import disc_sim_ros
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / 'disc_sim_ros'
+HEAVY = {'scipy', 'matplotlib', 'pyarrow', 'dask', 'distributed', 'rclpy', 'PIL'}
+# Names of flights and bags; those of ensembles may import scipy.
+LIGHT = (
+    'Launch', 'Setup', 'Wind', 'Air', 'Disc', 'load_disc', 'disc_names', 'fly', 'fly_many',
+    'Flight', 'Landings', 'Trajectory', 'Control', 'State', 'FlightSimulator', 'Bag', 'open_bag',
+    'BagWriter', 'Qos', 'Topic', 'Quantity', 'QUANTITIES', 'AeroTable', 'LinearAero', 'SpinTable',
+    'DiscSimError', 'ConfigError', 'IntegrationError', 'BagError', 'DamageError', 'WriteError',
+)  # fmt: skip
+
+
+def loaded_by(line: str) -> set[str]:
+    """Return the top-level names of the modules in a fresh process after a line of Python."""
+    program = f'import json, sys\n{line}\nprint(json.dumps(sorted(sys.modules)))'
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, check=True, timeout=120
+    )
+    return {name.partition('.')[0] for name in json.loads(done.stdout)}
+
+
+def test_the_package_alone_loads_nothing_but_the_standard_library():
+    before = loaded_by('')
+    others = loaded_by('import disc_sim_ros') - before - set(sys.stdlib_module_names)
+    assert others == {'disc_sim_ros'}
+
+
+@pytest.mark.parametrize('name', LIGHT)
+def test_a_name_of_flights_or_bags_loads_no_heavy_package(name):
+    assert loaded_by(f'from disc_sim_ros import {name}') & HEAVY == set()
+
+
+def test_a_heavy_import_is_noticed():
+    """Studies draw from scipy's distributions; plots need matplotlib."""
+    assert 'scipy' in loaded_by('from disc_sim_ros import Study') & HEAVY
+    assert 'matplotlib' in loaded_by('import disc_sim_ros.analysis.plots') & HEAVY
+
+
+def test_every_public_name_is_there_and_comes_from_its_module():
+    for name in disc_sim_ros.__all__:
+        assert getattr(disc_sim_ros, name) is not None
+    assert set(LIGHT) <= set(disc_sim_ros.__all__)
+    assert set(disc_sim_ros.__all__) <= set(dir(disc_sim_ros))
+    assert '__version__' in dir(disc_sim_ros)
+    from disc_sim_ros.physics.launch import Launch
+
+    assert disc_sim_ros.Launch is Launch
+
+
+def test_a_misspelt_name_is_an_import_error():
+    with pytest.raises(ImportError, match='Lunch'):
+        from disc_sim_ros import Lunch  # noqa: F401
+    with pytest.raises(AttributeError, match='Lunch'):
+        disc_sim_ros.Lunch  # noqa: B018
+
+
+def typed_imports(source: str) -> dict[str, str]:
+    """Return the module of each name that type checkers see imported."""
+    (block,) = (
+        node
+        for node in ast.parse(source).body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == 'TYPE_CHECKING'
+    )
+    return {
+        alias.name: statement.module.removeprefix('disc_sim_ros.')
+        for statement in block.body
+        for alias in statement.names
+    }
+
+
+def test_type_checkers_see_the_names_that_python_imports():
+    seen = typed_imports((PACKAGE / '__init__.py').read_text(encoding='utf-8'))
+    assert seen == disc_sim_ros._MODULE_OF
+    assert sorted(seen) == sorted(disc_sim_ros.__all__)
+    for name, module in seen.items():  # where it is defined, not passed on
+        defined = getattr(importlib.import_module(f'disc_sim_ros.{module}'), name)
+        assert getattr(defined, '__module__', f'disc_sim_ros.{module}') == f'disc_sim_ros.{module}'
+
+
+def from_the_public_api(source: str) -> list[str]:
+    """Return what a module of the package imports through the public interface."""
+    return [
+        alias.name
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ImportFrom) and node.module == 'disc_sim_ros'
+        for alias in node.names
+        if alias.name in disc_sim_ros.__all__
+    ]
+
+
+def test_modules_of_the_package_import_each_other_directly():
+    """The import rules do not follow an import through the public interface."""
+    for path in PACKAGE.rglob('*.py'):
+        assert from_the_public_api(path.read_text(encoding='utf-8')) == [], path
+    assert from_the_public_api('def f():\n    from disc_sim_ros import open_bag\n') == ['open_bag']
