@@ -1,1 +1,1 @@
-"""The experiments of the paper, one file per figure."""
+"""The figures of the paper, one file per figure, and the statements of its text."""

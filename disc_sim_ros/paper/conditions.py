@@ -1,8 +1,8 @@
-"""What the figures have in common: the paper's disc, model and launches, and sampled curves.
+"""What all figures share: the disc, the model and the launches of the paper, and sampled curves.
 
-The text uses the constant spin rate model unless it says otherwise, so the figures do. Each flight
-is flown with the roll and pitch damping as printed and with a tenth of it, which meets Fig. 5 best
-(docs/deviations.md); moment coefficients act in axes 3.
+The paper uses the constant-spin model unless its text says otherwise, and so do the figures. Each
+flight is computed with the printed roll and pitch damping and with a tenth of it, which agrees
+best with Fig. 5 (docs/deviations.md). Moment coefficients act in axes 3.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,9 +25,9 @@ from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.trajectory import Trajectory
 
 MODEL = 'constant_spin'
-PRINTED, TENTH, HUNDREDTH = 1.0, 0.1, 0.01  # share of the printed C_Lp and C_Mq
+PRINTED, TENTH, HUNDREDTH = 1.0, 0.1, 0.01  # shares of the printed C_Lp and C_Mq
 SHARES = (PRINTED, TENTH)
-RATE = 100.0  # Hz, samples of a curve
+RATE = 100.0  # Hz, sample rate of the curves
 CONDITIONS = (
     'Constant-spin model, moments in axes 3 (body); roll and pitch damping as printed '
     'and 10 % of it.'
@@ -39,10 +39,10 @@ class Curve:
     """One flight of a figure.
 
     Attributes:
-        label: What sets it apart in its panel, with the unit.
+        label: Its name in the legend, with the unit.
         share: Share of the printed roll and pitch damping.
         flight: The flight, sampled at `RATE`.
-        value: The number that is varied, in the unit of the label; 0 where none is.
+        value: Value of the varied quantity, in the unit of the label; 0 if none is varied.
     """
 
     label: str
@@ -52,12 +52,12 @@ class Curve:
 
     @property
     def t(self) -> Trajectory:
-        """The samples."""
+        """Return the samples."""
         return self.flight.trajectory
 
 
 def percent(share: float) -> str:
-    """Return a share of the printed damping in words."""
+    """Return a share of the printed damping as words."""
     return 'damping as printed' if share == PRINTED else f'{100 * share:g} % damping'
 
 
@@ -74,7 +74,7 @@ def spin_of(AdvR: float, speed: float) -> float:
 
 
 def level(AdvR: float, *, speed: float = 19.0, **angles: float) -> Launch:
-    """Return a launch of the paper's Fig. 6: 19 m/s, all angles 0 unless given [degrees]."""
+    """Return a launch of Fig. 6: 19 m/s by default, each angle 0 unless given [degrees]."""
     return Launch(speed=speed, spin=spin_of(AdvR, speed), **{'pitch': 0.0, **angles})
 
 
@@ -92,7 +92,7 @@ def flown(
     control: Control = NO_CONTROL,
     rate: float = RATE,
 ) -> Flight:
-    """Fly the paper's disc; the same flight is flown once."""
+    """Fly the paper's disc; a repeated call returns the same flight."""
     setup = Setup(
         disc=frisbee(share),
         model=model,
@@ -104,7 +104,7 @@ def flown(
 
 
 def read(name: str) -> dict[str, FloatArray]:
-    """Return the columns of a file of points read off the paper, of the folder data."""
+    """Return the columns of a file in the folder data: points read off the paper's figures."""
     text = (files('disc_sim_ros.paper') / 'data' / name).read_text(encoding='utf-8')
     lines = [line for line in text.splitlines() if not line.startswith('#')]
     rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
@@ -112,7 +112,7 @@ def read(name: str) -> dict[str, FloatArray]:
 
 
 def quantities(t: Trajectory) -> dict[str, FloatArray]:
-    """Return what the paper plots of a flight, in its axes 1, under names with units."""
+    """Return the histories that the paper plots, in its axes 1, by names with units."""
     X, Y, Z = t.position.T
     phi, theta, _ = np.degrees(t.euler).T
     return {
@@ -131,14 +131,14 @@ def quantities(t: Trajectory) -> dict[str, FloatArray]:
 
 
 def csv_of_curves(curves: Iterable[Curve], paper: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return curves one below the other as CSV; `paper` adds points read off, by label."""
+    """Return curves as CSV, one below the other; `paper` adds points read off, by their label."""
     rows: list[list[Any]] = []
     names: list[str] = []
     for curve in curves:
-        found = quantities(curve.t)
-        names = list(found)
+        histories = quantities(curve.t)
+        names = list(histories)
         label = [curve.label, f'{curve.share:g}']
-        rows += [[*label, *row] for row in np.column_stack(list(found.values())).tolist()]
+        rows += [[*label, *row] for row in np.column_stack(list(histories.values())).tolist()]
     for label_of_points, points in paper.items():
         for i in range(len(points['t_s'])):
             cells = [points[name][i] if name in points else '' for name in names]
@@ -147,7 +147,7 @@ def csv_of_curves(curves: Iterable[Curve], paper: Mapping[str, Mapping[str, Any]
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Return a header and rows as CSV; numbers with 9 digits, what is not finite as nothing."""
+    """Return a header and rows as CSV: numbers with 9 digits, NaN and infinity as empty cells."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator='\n')
     writer.writerow(header)

@@ -1,9 +1,9 @@
 """A second integration of a flight, with another formulation and another integrator.
 
-No quaternion, no axes of the disc, no RK4, and nothing of `core.equations`: velocity, the disc's
-normal and its transverse angular velocity are vectors in earth axes, and scipy's DOP853 steps.
-Only the constants of the disc are shared. Source: paper, eqns 10, 11, 15 to 33, corrected as
-docs/deviations.md says; moments in axes 3.
+It uses no quaternion, no axes of the disc, no RK4 and nothing of `physics.kernels`: the velocity,
+the normal of the disc and its transverse angular velocity are vectors in earth axes, and scipy's
+DOP853 integrates them. Only the constants of the disc are shared. Source: paper, eqns 10, 11 and
+15 to 33, with the corrections of docs/deviations.md; moments in axes 3.
 """
 
 import math
@@ -15,22 +15,25 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.flight import Flight
 
 TOLERANCE = 1e-8  # of DOP853, relative and absolute
-LONGEST_STEP = 0.02  # s: no corner of the table is stepped over by much
+LONGEST_STEP = 0.02  # s; limits the error at the corners of the table
 
 
 def largest_distance(flight: Flight) -> float:
-    """Return how far a flight is at most from its independent repetition [m].
+    """Return the largest distance between a flight and its second integration [m].
 
     Args:
-        flight: Sampled, in the exact or the constant-spin model, moments in axes 3, no wind.
+        flight: A sampled flight in the exact or the constant-spin model, with moments in axes 3
+            and without wind.
 
     Raises:
-        ValueError: The flight has what this integration does not know.
+        ValueError: This integration does not cover the model, the axes or the wind.
     """
     setup = flight.setup
-    known = setup.model in {'exact', 'constant_spin'} and setup.moment_axes == 'body'
-    if not known or setup.wind.turbulence or any(setup.wind.mean):
-        raise ValueError('only exact and constant_spin, axes 3, still air')
+    covered = setup.model in {'exact', 'constant_spin'} and setup.moment_axes == 'body'
+    if not covered or setup.wind.turbulence or any(setup.wind.mean):
+        raise ValueError(
+            'the second integration covers exact and constant_spin, axes 3, still air'
+        )
     t = flight.trajectory
     solution = solve_ivp(
         lambda _, y: _rates(y, flight),
@@ -84,7 +87,7 @@ def _rates(y: FloatArray, flight: Flight) -> FloatArray:
     C_N = disc.C_Nr * per_rate * r + control.C_N
     qSc = qS * disc.diameter
     n_rate = _cross(omega, n)
-    # d/dt (I_x omega + I_z r n) = M; omega stays at right angles to n.
+    # d/dt (I_x omega + I_z r n) = M; omega stays perpendicular to n.
     torque = qSc * (C_L * ahead + C_M * across) - disc.inertia_axial * r * n_rate
     omega_rate = torque / disc.inertia_diametral - (omega @ n_rate) * n
     r_rate = qSc * C_N / disc.inertia_axial if flight.setup.model == 'exact' else 0.0
@@ -93,7 +96,7 @@ def _rates(y: FloatArray, flight: Flight) -> FloatArray:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the vector product; numpy's takes ten times as long for two vectors."""
+    """Return the cross product; numpy's takes ten times as long for two vectors."""
     (a_x, a_y, a_z), (b_x, b_y, b_z) = a.tolist(), b.tolist()
     return np.array([a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x])
 

@@ -1,4 +1,4 @@
-"""Fig. 3: the steady coefficients: wind tunnel table, the symbols read off, and the lines."""
+"""Fig. 3: steady coefficients: the wind tunnel table, symbols read off, and the fitted lines."""
 
 from dataclasses import dataclass
 import math
@@ -11,8 +11,8 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig05_typical_flight import DURATION, LAUNCH
+from disc_sim_ros.paper.figure_files import PaperFigure
 
-KEY = '3'
 TITLE = 'Fig. 3: steady coefficients of the disc'
 CONDITIONS = (
     'Wind tunnel, no damping, moment about y of axes 3 (body). Table: what flies, linear between '
@@ -23,12 +23,12 @@ NAMES = {'CL': 'C_Lift', 'CD': 'C_Drag', 'CM': 'C_M'}
 
 @dataclass(frozen=True)
 class Data:
-    """Coefficients over the angle of attack.
+    """Coefficients against the angle of attack.
 
     Attributes:
-        alpha: Angles of the curves [degrees], shape (n,).
+        alpha: Angles of attack of the curves [degrees], shape (n,).
         table: C_Lift, C_Drag, C_M of the table, shape (n, 3).
-        linear: Those of the printed lines, shape (n, 3).
+        linear: C_Lift, C_Drag, C_M of the printed lines, shape (n, 3).
         read: Columns of the symbols of Fig. 3.
     """
 
@@ -38,16 +38,16 @@ class Data:
     read: dict[str, FloatArray]
 
     def zero(self, column: int) -> float:
-        """Return the angle near which a coefficient of the table changes sign [degrees]."""
+        """Return the angle of attack at which a coefficient of the table is zero [degrees]."""
         return crossing(self.alpha, self.table[:, column])
 
     def read_zero(self, name: str) -> float:
-        """Return the same of the symbols read off [degrees]."""
+        """Return the angle of attack at which a coefficient of the symbols is zero [degrees]."""
         return crossing(self.read['alpha_deg'], self.read[name])
 
 
 def crossing(alpha: FloatArray, values: FloatArray) -> float:
-    """Return the last angle where values rise through zero, by interpolation [degrees]."""
+    """Return the last angle at which values rise through zero, interpolated [degrees]."""
     i = int(np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))[-1])
     return float(alpha[i] - values[i] * (alpha[i + 1] - alpha[i]) / (values[i + 1] - values[i]))
 
@@ -57,7 +57,7 @@ def compute() -> Data:
     disc = conditions.frisbee()
     table, line = disc.table, disc.linear
     if table is None or line is None:
-        raise ValueError("the paper's disc has a table and lines")
+        raise ValueError('the disc frisbee needs a table and lines')
     alpha = np.arange(-15.0, 45.0 + 0.25, 0.5)
     a = np.radians(alpha)
     columns = [np.interp(a, table.alpha, column) for column in table.coefficients.T]
@@ -71,14 +71,14 @@ def compute() -> Data:
 
 
 def slope(data: Data, name: str, low: float = 0.0, high: float = 10.0) -> float:
-    """Return the slope of a coefficient of the symbols by least squares [1/rad]."""
+    """Return the least-squares slope of a coefficient of the symbols [1/rad]."""
     chosen = (data.read['alpha_deg'] >= low) & (data.read['alpha_deg'] <= high)
     a = np.radians(data.read['alpha_deg'][chosen])
     return float(np.polyfit(a, data.read[name][chosen], 1)[0])
 
 
 def misfit(data: Data, low: float, high: float) -> float:
-    """Return the rms of line minus symbols of C_M between two angles [1]."""
+    """Return the rms difference of line and symbols of C_M between two angles [1]."""
     line = conditions.frisbee().linear
     if line is None:
         return math.nan
@@ -106,9 +106,9 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say where lift and moment change sign, and how good the line of C_M is."""
+    """Return the angles of zero lift and zero moment, and the misfit of the line of C_M."""
     return [
-        f'No lift at {data.zero(0):.1f}° (table), {data.read_zero("CL"):.1f}° (symbols).',
+        f'Zero lift at {data.zero(0):.1f}° (table), {data.read_zero("CL"):.1f}° (symbols).',
         f'C_M changes sign at {data.zero(2):.1f}° (table), {data.read_zero("CM"):.1f}° (symbols), '
         'and by the printed line at '
         f'{math.degrees(0.01 / 0.057):.1f}°.',
@@ -118,21 +118,28 @@ def findings(data: Data) -> list[str]:
 
 
 def table(data: Data) -> str:
-    """Return the curves as CSV; the symbols are a file of the package."""
+    """Return the curves as CSV; the symbols are in a file of the package."""
     header = ['alpha_deg', *(f'{name}_{kind}' for kind in ('table', 'linear') for name in NAMES)]
     return conditions.csv_text(header, np.column_stack([data.alpha, data.table, data.linear]))
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time: Fig. 5 with the printed lines."""
+    """Return the flight to integrate a second time: Fig. 5 with the printed lines."""
     flight = conditions.flown(LAUNCH, duration=DURATION, aero='linear')
     return Curve('Fig. 5, linear aerodynamics', conditions.PRINTED, flight)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='3',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

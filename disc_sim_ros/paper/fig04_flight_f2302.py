@@ -1,8 +1,7 @@
 """Fig. 4: Hummel's flight f2302, from the launch as printed and as corrected.
 
-The printed state was made from Hummel's angles, which are of the sequence 1-2-3, as if they were
-yaw, pitch and roll (docs/deviations.md). Her recording is not in this package, so that only the
-two launches are compared.
+The printed state treats Hummel's angles, which are of the sequence 1-2-3, as yaw, pitch and roll
+(docs/deviations.md). Her recording is not in this package: only the two launches are compared.
 """
 
 from dataclasses import dataclass
@@ -16,10 +15,10 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.paper.figure_files import PaperFigure
 from disc_sim_ros.physics import frames, theory
 from disc_sim_ros.physics.launch import Launch
 
-KEY = '4'
 TITLE = 'Fig. 4: flight f2302, launch as printed and as corrected'
 CONDITIONS = (
     conditions.CONDITIONS + " Paper's disc, table aerodynamics, flown to the ground.\n"
@@ -30,28 +29,28 @@ RELEASE = (-0.90, -0.63, -0.91)  # X, Y, Z, m
 ANGLES = (-0.07, 0.21, 5.03)  # phi, theta, psi, rad
 UVW = (4.48, 12.52, 1.84)  # m/s
 PQR = (-26.25, -5.19, 52.85)  # rad/s
-# Hummel 2003, Table 3-3: the same angles as a sequence 1-2-3, velocity in earth axes, and rates
-# of the angles.
+# Hummel 2003, Table 3-3: the same angles as a sequence 1-2-3, the velocity in earth axes, and the
+# rates of the angles.
 VELOCITY = (13.42, -0.41, 0.001)  # m/s
 ANGLE_RATES = (-14.94, -1.48, 54.25)  # rad/s
-CALM = 0.2  # s, in which the first wobble is measured
+FIRST_WOBBLE = 0.2  # s, time span in which it is measured
 
 
 @dataclass(frozen=True)
 class Data:
-    """Flights of both launches, for each damping."""
+    """The flights of both launches, each with both dampings."""
 
     printed: tuple[Curve, ...]
     corrected: tuple[Curve, ...]
 
     @property
     def curves(self) -> tuple[Curve, ...]:
-        """All flights."""
+        """Return all flights."""
         return self.printed + self.corrected
 
 
 def printed_launch() -> Launch:
-    """Return the launch of the table below the paper's Fig. 4."""
+    """Return the launch of the table below Fig. 4 of the paper."""
     phi, theta, psi = (math.degrees(angle) for angle in ANGLES)
     return _launch((phi, theta, psi), UVW, PQR)
 
@@ -87,14 +86,14 @@ def compute() -> Data:
 
 
 def wobble(curve: Curve) -> float:
-    """Return half the swing of the angle of attack in the first 0.2 s [degrees]."""
-    first = np.degrees(curve.t.alpha)[curve.t.t <= CALM]
+    """Return the amplitude of the angle of attack in the first 0.2 s [degrees]."""
+    first = np.degrees(curve.t.alpha)[curve.t.t <= FIRST_WOBBLE]
     return float(np.ptp(first) / 2)
 
 
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
-    """Draw both views, speed and angle of attack."""
+    """Draw both views, the speed and the angle of attack."""
     figure = style.sheet(7.4, TITLE, CONDITIONS)
     grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.0, 1.0))
     top, side = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])
@@ -131,7 +130,7 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say what came out, in numbers."""
+    """Return launch angle, rates and wobble of both launches, and the landing times."""
     lines = []
     for launch, curves in (
         (printed_launch(), data.printed),
@@ -142,7 +141,7 @@ def findings(data: Data) -> list[str]:
         lines.append(
             f'{curves[0].label}: angle of attack {launch.angle_of_attack:.1f}°, transverse rate '
             f'{transverse:.2f} rad/s, spin {launch.spin:.2f} rad/s; angle of attack swings by '
-            f'±{swing} in the first {CALM} s; lands after '
+            f'±{swing} in the first {FIRST_WOBBLE} s; lands after '
             + ', '.join(f'{c.flight.time:.2f} s' for c in curves)
             + '.'
         )
@@ -150,18 +149,13 @@ def findings(data: Data) -> list[str]:
 
 
 def table(data: Data) -> str:
-    """Return the samples as CSV; X and Y count from the release."""
+    """Return the samples as CSV; X and Y are relative to the release."""
     return conditions.csv_of_curves(data.curves, {})
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.corrected[1]
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
 
 
 def _launch(angles: tuple[float, ...], uvw: tuple[float, ...], pqr: tuple[float, ...]) -> Launch:
@@ -181,7 +175,7 @@ def _launch(angles: tuple[float, ...], uvw: tuple[float, ...], pqr: tuple[float,
 
 
 def _about(axis: int, angle: float) -> FloatArray:
-    """Return the matrix of a turn about x, y or z."""
+    """Return the matrix of a rotation about x, y or z."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.zeros((3, 3))
     turn[axis, axis] = 1.0
@@ -191,5 +185,17 @@ def _about(axis: int, angle: float) -> FloatArray:
     return turn
 
 
+FIGURE = PaperFigure(
+    key='4',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
+
+
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

@@ -1,4 +1,4 @@
-"""Fig. 5: the typical flight, with the table of the wind tunnel and with straight lines."""
+"""Fig. 5: the typical flight, with the wind tunnel table and with the fitted lines."""
 
 from dataclasses import dataclass
 import sys
@@ -10,9 +10,9 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.paper.figure_files import PaperFigure
 from disc_sim_ros.physics.launch import Launch
 
-KEY = '5'
 TITLE = 'Fig. 5: a typical flight, table and linear aerodynamics'
 CONDITIONS = (
     'Constant-spin model, moments in axes 3 (body), damping as named. Discs every 0.2 s, '
@@ -29,12 +29,12 @@ HISTORIES = (  # letter, column of the paper's points, column of ours, label
     ('h', 'AdvR', 'AdvR', 'advance ratio'),
 )
 NAMES = {name: column for _, name, column, _ in HISTORIES}
-UNITS = {'V': 'm/s', 'AdvR': ''}  # of all others degrees
+UNITS = {'V': 'm/s', 'AdvR': ''}  # all others are in degrees
 
 
 @dataclass(frozen=True)
 class Data:
-    """Flights with the table and with lines, and the paper's curves as read off."""
+    """The flights with the table and with lines, and points read off the paper's curves."""
 
     curves: tuple[Curve, ...]
     linear: tuple[Curve, ...]
@@ -42,7 +42,7 @@ class Data:
 
 
 def compute() -> Data:
-    """Fly the launch without ground, as drawn: it starts at Z = 0 and goes on below."""
+    """Fly the launch without ground, as drawn: it starts at Z = 0 and continues below."""
 
     def flight(aero: str, share: float) -> Curve:
         flown = conditions.flown(LAUNCH, share, duration=DURATION, aero=aero)
@@ -57,7 +57,7 @@ def compute() -> Data:
 
 
 def rms(curve: Curve, read: dict[str, FloatArray], suffix: str = '') -> dict[str, float]:
-    """Return the rms distance to the points read off, all 21 of them, in the unit of each."""
+    """Return the rms distance of each history from all 21 points read off [its unit]."""
     at_points = np.searchsorted(curve.t.t, read['t_s'] - 1e-6)
     ours = conditions.quantities(curve.t)
     return {
@@ -108,20 +108,20 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say how far from the paper's curves each variant is."""
+    """Return the rms distance of each flight from the curves of the paper."""
     lines = [
         _distance(curve, rms(curve, data.read)) + ' from the black curves' for curve in data.curves
     ]
     lines += [
-        _distance(curve, rms(curve, data.read, '_lin')) + ' from the grey curves: the lines of '
-        'Fig. 3 do not give them, least of all the roll'
+        _distance(curve, rms(curve, data.read, '_lin')) + ' from the grey curves: the lines '
+        'of Fig. 3 do not reproduce them, least of all the roll'
         for curve in data.linear
     ]
     return [f'{line}.' for line in lines]
 
 
-def _distance(curve: Curve, found: dict[str, float]) -> str:
-    parts = (f'{name} {value:.2f} {UNITS.get(name, "°")}'.strip() for name, value in found.items())
+def _distance(curve: Curve, rms: dict[str, float]) -> str:
+    parts = (f'{name} {value:.2f} {UNITS.get(name, "°")}'.strip() for name, value in rms.items())
     return f'{curve.label}: rms ' + ', '.join(parts)
 
 
@@ -135,14 +135,21 @@ def table(data: Data) -> str:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.curves[1]
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='5',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

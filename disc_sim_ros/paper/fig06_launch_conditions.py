@@ -1,8 +1,8 @@
-"""Fig. 6: side view and view from above for other spins, pitches, angles of attack and rolls.
+"""Fig. 6: side view and top view for several spins, pitches, angles of attack and rolls.
 
-The text gives V = 19 m/s and, of the advance ratios, 1.1 for c and d and 0.5 for e and f;
-those of g and h it calls less than that of Fig. 5. The values that are varied
-stand in the figure's legends only, so the ones here are chosen to span what the text discusses.
+The text gives V = 19 m/s and the advance ratios 1.1 for c and d and 0.5 for e and f; for g and h
+it says only that the advance ratio is less than in Fig. 5. The varied values are printed only in
+the legends of the figure; those here are chosen to span what the text discusses.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,18 +15,18 @@ import numpy as np
 
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.paper.figure_files import PaperFigure
 from disc_sim_ros.physics.launch import Launch
 
-KEY = '6'
 TITLE = 'Fig. 6: effect of the launch, 19 m/s'
 CONDITIONS = (
     'Constant-spin model, table aerodynamics, moments in axes 3 (body).\nSolid: damping as '
     'printed, with discs every 0.4 s, enlarged 6 times; dotted: 10 % damping.'
 )
-ADV_R_PITCH, ADV_R_ALPHA = 1.1, 0.5  # text, of panels c to f
-ADV_R_ROLL = 0.25  # not printed; the text only says less than in Fig. 5, 0.29
+ADV_R_PITCH, ADV_R_ALPHA = 1.1, 0.5  # of panels c, d and e, f, from the text
+ADV_R_ROLL = 0.25  # not printed; the text says only less than in Fig. 5, 0.29
 PITCH_ROLL = 20.0  # degrees, of panels g and h
-LONGEST = 4.0  # s, of launches that start level at Z = 0 and go on below
+LONGEST = 4.0  # s, of launches that start level at Z = 0 and continue below
 RATIOS = (0.0, 0.1, 0.2, 0.4, 1.1, 3.2)
 PITCHES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0)
 ALPHAS = (0.0, 15.0, 30.0, 45.0, 60.0, 90.0)
@@ -35,7 +35,7 @@ ROLLS = (-30.0, -20.0, -10.0, -7.0, 0.0, 10.0, 20.0, 30.0)
 
 @dataclass(frozen=True)
 class Panel:
-    """A row of the figure: what is varied, with the flights of all values and dampings."""
+    """A row of the figure: the flights for all values of one quantity, with both dampings."""
 
     name: str
     curves: tuple[Curve, ...]
@@ -48,7 +48,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Data:
-    """Rows a-b, c-d, e-f and g-h."""
+    """The rows a-b, c-d, e-f and g-h."""
 
     panels: tuple[Panel, ...]
 
@@ -59,7 +59,7 @@ def ratio_launch(ratio: float) -> Launch:
 
 
 def pitch_launch(pitch: float) -> Launch:
-    """Return a launch along the disc's own x axis at a pitch [degrees] (c, d)."""
+    """Return a launch along the x axis of the disc at a pitch [degrees] (c, d)."""
     return conditions.level(ADV_R_PITCH, pitch=pitch)
 
 
@@ -107,7 +107,7 @@ def compute() -> Data:
 
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
-    """Draw the eight panels: a row for each thing that is varied."""
+    """Draw the eight panels: a row for each varied quantity."""
     figure = style.sheet(10.8, TITLE, CONDITIONS)
     grid = figure.add_gridspec(4, 2, height_ratios=(1, 0.75, 1, 1.3))
     titles = (
@@ -137,7 +137,7 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say how far each launch went, in numbers."""
+    """Return the end of each flight."""
     lines = []
     for panel in data.panels:
         ends = (
@@ -149,13 +149,13 @@ def findings(data: Data) -> list[str]:
 
 
 def returns(pitch: float, share: float) -> bool:
-    """Say whether a disc thrown at a pitch [degrees] flies backwards before it lands (c)."""
+    """Return True if a disc thrown at a pitch [degrees] flies backwards before it lands (c)."""
     flight = conditions.flown(pitch_launch(pitch), share, ground=True)
     return bool(np.min(flight.trajectory.velocity[:, 0]) < 0.0)
 
 
 def least_returning_pitch(share: float, spacing: int) -> float:
-    """Return the least pitch on a grid of a spacing from which the disc turns back [degrees]."""
+    """Return the least pitch from which the disc turns back, on a grid [degrees]."""
     for pitch in range(spacing, 91, spacing):
         if returns(float(pitch), share):
             return float(pitch)
@@ -168,14 +168,21 @@ def table(data: Data) -> str:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.panels[0].of(conditions.PRINTED)[3]
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='6',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

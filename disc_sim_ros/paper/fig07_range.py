@@ -1,4 +1,4 @@
-"""Fig. 7: range over the launch pitch."""
+"""Fig. 7: range against the launch pitch."""
 
 from dataclasses import dataclass
 import sys
@@ -11,22 +11,22 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig06_launch_conditions import pitch_launch
+from disc_sim_ros.paper.figure_files import PaperFigure
 
-KEY = '7'
 TITLE = 'Fig. 7: range over launch pitch, 19 m/s, AdvR 1.1'
 CONDITIONS = conditions.CONDITIONS + ' Landing where the centre crosses Z = 0.'
-COARSE = 10.0  # degrees: ten points from 0 to 90
+COARSE = 10.0  # degrees; ten points from 0 to 90
 FINE = 0.5  # degrees
-PAPER = 10.0  # degrees, of the greatest range
+PAPER = 10.0  # degrees, pitch of the greatest range in the paper
 
 
 @dataclass(frozen=True)
 class Data:
-    """Flights to the ground over the pitch, for each damping.
+    """Flights to the ground for a range of pitches, with both dampings.
 
     Attributes:
         pitch: Launch pitch [degrees], shape (n,).
-        range: Distance over the ground, one row for each of `paper.SHARES` [m], shape (2, n).
+        range: Distance over the ground, a row for each of `conditions.SHARES` [m], shape (2, n).
         duration: Time of flight, likewise [s], shape (2, n).
         longest: One flight near the greatest range.
     """
@@ -37,7 +37,7 @@ class Data:
     longest: Curve
 
     def best(self, values: FloatArray, spacing: float = FINE) -> float:
-        """Return the pitch of the largest of `values`, on a grid of a spacing [degrees]."""
+        """Return the pitch of the largest of `values`, on a grid with a spacing [degrees]."""
         on_grid = np.flatnonzero(np.isclose(self.pitch % spacing, 0.0))
         return float(self.pitch[on_grid[np.argmax(values[on_grid])]])
 
@@ -63,7 +63,7 @@ def compute() -> Data:
 
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
-    """Draw range over pitch."""
+    """Draw the range against the pitch."""
     return draw(data, data.range, 'range, m', stated=PAPER, words=(TITLE, CONDITIONS), look=look)
 
 
@@ -76,7 +76,7 @@ def draw(
     words: tuple[str, str],
     look: style.Look,
 ) -> Figure:
-    """Draw one quantity over the pitch, with the best pitches and the paper's."""
+    """Draw one quantity against the pitch, with the best pitches and that of the paper."""
     figure = style.sheet(4.6, *words)
     axis = figure.add_subplot()
     lines: tuple[dict[str, Any], ...] = (
@@ -99,16 +99,16 @@ def draw(
 
 
 def findings(data: Data) -> list[str]:
-    """Say where the range is greatest."""
+    """Return the pitch of the greatest range."""
     return [
         f'{conditions.percent(share)}: greatest range {row.max():.1f} m at {data.best(row):g}°; '
         f'of ten points 10° apart at {data.best(row, COARSE):g}°.'
         for share, row in zip(conditions.SHARES, data.range, strict=True)
-    ] + ['At 0° the lift is less than the weight, the disc sinks at once and has no range.']
+    ] + ['At 0° the lift is less than the weight: the disc sinks at once and has no range.']
 
 
 def table(data: Data) -> str:
-    """Return range and duration over pitch as CSV."""
+    """Return range and duration against pitch as CSV."""
     names = ['pitch_deg']
     names += [
         f'{what}_damping_{s:g}' for s in conditions.SHARES for what in ('range_m', 'duration_s')
@@ -120,14 +120,21 @@ def table(data: Data) -> str:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.longest
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='7',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

@@ -1,4 +1,4 @@
-"""Fig. 8: duration over the launch pitch, of the flights of Fig. 7."""
+"""Fig. 8: duration against the launch pitch, of the flights of Fig. 7."""
 
 import sys
 
@@ -9,17 +9,15 @@ from disc_sim_ros.paper import conditions, fig07_range, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig06_launch_conditions import pitch_launch
 from disc_sim_ros.paper.fig07_range import COARSE, CONDITIONS, Data, compute, table
+from disc_sim_ros.paper.figure_files import PaperFigure
 
-__all__ = ['CONDITIONS', 'KEY', 'TITLE', 'compute', 'example', 'findings', 'main', 'plot', 'table']
-
-KEY = '8'
 TITLE = 'Fig. 8: duration over launch pitch, 19 m/s, AdvR 1.1'
-PAPER = 20.0  # degrees, of the greatest duration
+PAPER = 20.0  # degrees, pitch of the greatest duration in the paper
 
 
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
-    """Draw duration over pitch."""
+    """Draw the duration against the pitch."""
     words = (TITLE, CONDITIONS)
     return fig07_range.draw(
         data, data.duration, 'duration, s', stated=PAPER, words=words, look=look
@@ -27,7 +25,7 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say where the duration is greatest, and how flat the curve is."""
+    """Return the pitch of the greatest duration, and how flat the curve is."""
     lines = []
     for share, row in zip(conditions.SHARES, data.duration, strict=True):
         at_paper = float(np.interp(PAPER, data.pitch, row))
@@ -40,15 +38,22 @@ def findings(data: Data) -> list[str]:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     flight = conditions.flown(pitch_launch(20.0), conditions.TENTH, ground=True)
     return Curve('θ 20°', conditions.TENTH, flight)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='8',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

@@ -1,4 +1,4 @@
-"""Fig. 9: where the disc lands over the launch roll, of the flights of Fig. 6g, h."""
+"""Fig. 9: landing position against the launch roll, of the flights of Fig. 6g, h."""
 
 from dataclasses import dataclass
 import sys
@@ -10,8 +10,8 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig06_launch_conditions import ADV_R_ROLL, roll_launch
+from disc_sim_ros.paper.figure_files import PaperFigure
 
-KEY = '9'
 TITLE = 'Fig. 9: landing position over launch roll, 19 m/s, pitch 20°'
 CONDITIONS = (
     conditions.CONDITIONS
@@ -24,10 +24,10 @@ RATIOS = (0.2, ADV_R_ROLL, 0.29, 0.5)
 
 @dataclass(frozen=True)
 class Data:
-    """Landings over roll, for each advance ratio and damping.
+    """Landings for a range of rolls, for each advance ratio and damping.
 
     Attributes:
-        landing: X, Y of the landing; axes: `RATIOS`, `paper.SHARES`, `ROLLS`, [m].
+        landing: X, Y of the landings [m], shape (RATIOS, conditions.SHARES, ROLLS, 2).
         straight: The flight without roll at the assumed advance ratio.
     """
 
@@ -36,17 +36,17 @@ class Data:
 
     def of(self, ratio: float, share: float) -> FloatArray:
         """Return the landings at an advance ratio and damping [m], shape (61, 2)."""
-        found: FloatArray = self.landing[RATIOS.index(ratio), conditions.SHARES.index(share)]
-        return found
+        xy: FloatArray = self.landing[RATIOS.index(ratio), conditions.SHARES.index(share)]
+        return xy
 
     def crossing(self, ratio: float, share: float) -> float:
-        """Return the roll from which the disc lands on the X axis [degrees], by interpolation."""
+        """Return the roll from which the disc lands on the X axis, interpolated [degrees]."""
         Y = self.of(ratio, share)[:, 1]
         i = int(np.flatnonzero(Y[:-1] * Y[1:] <= 0.0)[0])
         return float(ROLLS[i] - Y[i] * (ROLLS[i + 1] - ROLLS[i]) / (Y[i + 1] - Y[i]))
 
     def without_roll(self, ratio: float, share: float) -> float:
-        """Return how far right of the X axis the disc lands without roll [m]."""
+        """Return the landing to the right of the X axis without roll [m]."""
         return float(self.of(ratio, share)[ROLLS == 0.0, 1][0])
 
 
@@ -67,7 +67,7 @@ def compute() -> Data:
 
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
-    """Draw the locus for each advance ratio, one damping below the other."""
+    """Draw the landings for each advance ratio, one damping below the other."""
     figure = style.sheet(6.6, TITLE, CONDITIONS)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     colours = style.family(RATIOS, look)
@@ -93,13 +93,13 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def steepest(roll: float) -> float:
-    """Return the largest angle of attack on the way, assumed AdvR, 10 % damping [degrees]."""
+    """Return the largest angle of attack at the assumed AdvR and 10 % damping [degrees]."""
     flight = conditions.flown(roll_launch(roll), conditions.TENTH, ground=True)
     return float(np.degrees(flight.trajectory.alpha).max())
 
 
 def findings(data: Data) -> list[str]:
-    """Say where the locus crosses the X axis, and what its corner is."""
+    """Return where the landings cross the X axis, and the cause of the corner."""
     lines = [
         f'AdvR {ratio:g}, {conditions.percent(share)}: on the X axis at a roll of '
         f'{data.crossing(ratio, share):.1f}°, {data.without_roll(ratio, share):.1f} m to the '
@@ -128,14 +128,21 @@ def table(data: Data) -> str:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.straight
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='9',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

@@ -1,7 +1,7 @@
-"""Fig. 10: dimensionless trajectories of flat plates of equal k_n / AdvR fall together.
+"""Fig. 10: dimensionless trajectories of flat plates of equal k_n / AdvR coincide.
 
-The plate is `flat_plate` of the catalogue, with the printed 0.06 m for a radius
-(docs/deviations.md). Which speeds, masses and ratios were drawn is not printed.
+The plate is `flat_plate` of the catalogue, for which the printed 0.06 m is the radius
+(docs/deviations.md). The paper does not print the speeds, masses and ratios of its curves.
 """
 
 from dataclasses import dataclass, replace
@@ -14,12 +14,12 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
+from disc_sim_ros.paper.figure_files import PaperFigure
 from disc_sim_ros.physics import disc_file, theory
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.flight import Flight, Setup, fly
 from disc_sim_ros.physics.launch import Launch
 
-KEY = '10'
 TITLE = 'Fig. 10: dimensionless flights of flat plates'
 CONDITIONS = (
     'Constant-spin model, linear aerodynamics, moments in axes 3 (body); the paper gives the '
@@ -28,24 +28,24 @@ CONDITIONS = (
 SPEED, ALPHA = 15.7, 2.0  # m/s and degrees at launch
 GRAVITY = 9.81  # m/s^2
 LONGEST = 1.5  # dimensionless time t g / V
-MASS_FACTORS = (0.5, 1.0, 2.0, 4.0)  # first row: speed times their roots, so that lift = weight
+MASS_FACTORS = (0.5, 1.0, 2.0, 4.0)  # first row; the speed grows with the root: lift = weight
 RATIOS = (0.5, 1.0, 2.0, 3.5)  # second row
-P_HAT_SECOND = 0.47  # of the second row, caption, by eqn 64 as printed
+P_HAT_SECOND = 0.47  # second row, from the caption, by eqn 64 as printed
 
 
 @dataclass(frozen=True)
 class Data:
-    """Flights of both rows; lengths are made dimensionless with the launch speed of each."""
+    """The flights of both rows; lengths are made dimensionless with the speed at launch."""
 
     first: tuple[Curve, ...]
     second: tuple[Curve, ...]
 
 
 def plate(mass_factor: float = 1.0, CM_alpha: float | None = None) -> Disc:
-    """Return the flat plate, heavier by a factor or with another moment slope."""
+    """Return the flat plate with another mass or another moment slope."""
     disc = disc_file.load_disc('flat_plate')
     if disc.linear is None:
-        raise ValueError('the flat plate has straight lines')
+        raise ValueError('the disc flat_plate needs lines')
     line = disc.linear if CM_alpha is None else replace(disc.linear, CM_alpha=CM_alpha)
     return replace(
         disc,
@@ -57,7 +57,7 @@ def plate(mass_factor: float = 1.0, CM_alpha: float | None = None) -> Disc:
 
 
 def launched(disc: Disc, speed: float, ratio: float) -> Flight:
-    """Fly a plate, itself level, released at 2 degrees of angle of attack (caption)."""
+    """Fly a level plate released at an angle of attack of 2 degrees (caption)."""
     spin = theory.spin_rate(ratio, disc.diameter, speed)
     launch = Launch(speed=speed, pitch=0.0, angle_of_attack=ALPHA, spin=spin)
     samples = 150
@@ -72,7 +72,7 @@ def launched(disc: Disc, speed: float, ratio: float) -> Flight:
 
 
 def moment_slope(ratio: float) -> float:
-    """Return the C_M slope at which eqn 64 as printed gives `P_HAT_SECOND` [1/rad]."""
+    """Return the slope of C_M for which eqn 64 as printed gives `P_HAT_SECOND` [1/rad]."""
     line = plate().linear
     return P_HAT_SECOND / 8.0 * ratio * (line.CL_alpha if line else math.nan)
 
@@ -106,7 +106,7 @@ def dimensionless(curve: Curve) -> FloatArray:
 
 
 def spread(curves: tuple[Curve, ...]) -> float:
-    """Return the largest distance between two flights at one time, by the way flown [1]."""
+    """Return the largest distance between flights at any time, relative to their length [1]."""
     paths = np.array([dimensionless(curve) for curve in curves])
     apart = np.linalg.norm(paths[:, None] - paths[None, :], axis=-1).max()
     way = np.linalg.norm(np.diff(paths[0], axis=0), axis=1).sum()
@@ -146,7 +146,7 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say how well each row falls together."""
+    """Return how closely the flights of each row coincide."""
     lines = []
     for name, curves in (('First', data.first), ('Second', data.second)):
         lines.append(
@@ -173,14 +173,21 @@ def table(data: Data) -> str:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.second[0]
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='10',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

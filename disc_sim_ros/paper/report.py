@@ -1,4 +1,4 @@
-"""The report that a person reads from top to bottom, as Markdown and as HTML."""
+"""The report of all figures and statements, as Markdown and as HTML."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,54 +7,54 @@ import platform
 
 from disc_sim_ros import __version__
 from disc_sim_ros.paper import figure_files
-from disc_sim_ros.paper.figure_files import Written
+from disc_sim_ros.paper.figure_files import WrittenFigure
 from disc_sim_ros.paper.statements import table
 from disc_sim_ros.paper.statements.rule import DIFFERS, NOT_REPRODUCIBLE, REPRODUCED, TAKEN, Result
 from disc_sim_ros.paper.style import DARK, LIGHT
 
-CLOSE = 0.01  # m, within which the second integration has to be
+CLOSE = 0.01  # m, allowed distance of the second integration
 INTRODUCTION = (
     'Every figure of Crowther & Potts, Simulation of a spin-stabilised sports disc, Sports '
-    'Engineering 10 (2007) 3-21, as disc_sim_ros computes it, beside what the paper says.',
-    'No coefficient was changed to meet a statement. The disc flies with the damping of roll and '
-    'pitch that the paper prints, and a second time with 10 % of it, and every figure says which '
-    'is which. Moment coefficients act in axes 3 (zero-sideslip body axes) unless a figure says '
-    'axes 4. The paper used the constant-spin model, so the figures do. Corrections of printed '
-    'equations are those of docs/deviations.md.',
-    'Launch values that the text leaves out are chosen, and the figure says so. Verdicts are '
-    'computed: a number is reproduced if ours is within half of the step to which it is printed, '
-    'or within the tolerance that stands beside it with its reason, with at least one of the two '
-    'dampings; the table says with which. What the text says in words is read as a bound, which '
-    'stands there too.',
+    'Engineering 10 (2007) 3-21, as disc_sim_ros computes it, compared with the paper.',
+    'No coefficient was changed to reproduce a statement. Each flight is computed with the roll '
+    'and pitch damping that the paper prints and with 10 % of it; every figure names the damping. '
+    'Moment coefficients act in axes 3 (zero-sideslip body axes) unless a figure says axes 4. The '
+    'figures use the constant-spin model, as the paper does. Corrections of printed equations are '
+    'listed in docs/deviations.md.',
+    'Launch values that the text does not give are chosen, and the figure says so. Verdicts are '
+    'computed: a number is reproduced if our number, with at least one of the two dampings, is '
+    'within half a unit of its last printed digit, or within the tolerance that the table states '
+    'with its reason; the table names the damping. Statements in words are read as bounds, which '
+    'the table states too.',
 )
 CHECK = (
-    'One flight of each figure was integrated a second time in this run, in another formulation '
-    "(vectors in earth axes, no quaternion) and with another integrator (scipy's DOP853); the "
-    'largest distance anywhere on the flight:'
+    'One flight of each figure was integrated a second time in this run, with another formulation '
+    "(vectors in earth axes, no quaternion) and another integrator (scipy's DOP853). Largest "
+    'distance between both on the flight:'
 )
 THIRD = (
-    'A third integration, in axes that spin with the disc, written from the paper alone, is among '
-    'the tests: python -m pytest test/paper/test_reference_of_figures.py'
+    'The tests have a third integration, in axes that spin with the disc, written from the paper '
+    'alone: python -m pytest test/paper/test_reference_of_figures.py'
 )
 MARKS = {REPRODUCED: '✓', DIFFERS: '✗', NOT_REPRODUCIBLE: '?', TAKEN: '='}
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a run found; `results` is None where the table was not asked for."""
+    """The results of a run; `results` is None without the table of statements."""
 
-    figures: tuple[Written, ...]
+    figures: tuple[WrittenFigure, ...]
     results: tuple[Result, ...] | None
     dark: bool
 
     def summary(self) -> list[str]:
-        """Say in sentences how it came out."""
+        """Return the outcome, in sentences."""
         lines = []
         if self.results is not None:
             counts = table.tally(self.results)
-            found = ', '.join(f'{count} {verdict}' for verdict, count in counts.items())
+            verdicts = ', '.join(f'{count} {verdict}' for verdict, count in counts.items())
             total, printed, tenth = table.met_by_damping(self.results)
-            lines.append(f'Of {len(self.results)} statements with a number: {found}.')
+            lines.append(f'Of {len(self.results)} statements with a number: {verdicts}.')
             lines.append(
                 f'Damping has a part in {total} of them: as printed it meets {printed}, 10 % '
                 f'of it {tenth}.'
@@ -81,7 +81,7 @@ class Report:
         ]
 
     def made_with(self) -> str:
-        """Say with what it was made."""
+        """Return the versions that computed the report."""
         return f'disc_sim_ros {__version__}, Python {platform.python_version()}'
 
 
@@ -115,7 +115,7 @@ def markdown(report: Report) -> str:
 
 
 def html(report: Report) -> str:
-    """Return the report as a page; only the pictures are other files, beside it."""
+    """Return the report as an HTML page; its pictures are files beside it."""
     body = ['<h1>The figures of Crowther &amp; Potts (2007), flown again</h1>']
     body += [f'<p>{escape(text)}</p>' for text in INTRODUCTION]
     body += [f'<p class="sum">{escape(text)}</p>' for text in report.summary()]
@@ -139,17 +139,17 @@ def html(report: Report) -> str:
     return _PAGE.replace('BODY', '\n'.join(body))
 
 
-def _short(figure: Written) -> str:
+def _short(figure: WrittenFigure) -> str:
     return figure.title.partition(':')[0]
 
 
-def _pictures(figure: Written) -> list[str]:
-    """Return the names of its light pictures, PNG first."""
+def _pictures(figure: WrittenFigure) -> list[str]:
+    """Return the names of the light pictures of a figure, PNG first."""
     names = [figure_files.picture(figure.key, kind, LIGHT) for kind in figure_files.FORMATS]
     return [name for name in names if name in figure.files]
 
 
-def _html_figure(figure: Written, *, dark: bool) -> str:
+def _html_figure(figure: WrittenFigure, *, dark: bool) -> str:
     pictures = _pictures(figure)
     title = escape(figure.title)
     parts = [f'<h2 id="{figure_files.stem(figure.key)}">{title}</h2>']
@@ -189,8 +189,8 @@ def _html_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     def line(cells: Sequence[str]) -> str:
         out = []
         for cell in cells:
-            known = classes.get(cell[:1]) if cell[1:2] == ' ' else None
-            kind = f' class="{known}"' if known else ''
+            name = classes.get(cell[:1]) if cell[1:2] == ' ' else None
+            kind = f' class="{name}"' if name else ''
             out.append(f'<td{kind}>{escape(cell)}</td>')
         return f'<tr>{"".join(out)}</tr>'
 

@@ -1,8 +1,8 @@
-"""The exact, constant-spin and precession models: how far apart they are and how long they take.
+"""The exact, constant-spin and precession models: their differences and their run times.
 
-The paper's 3 minutes (constant spin) and 10 minutes (exact) for a 5 s flight were taken on a
-233 MHz Pentium with Matlab's ode23s. Here the run time is that of one flight whose end is within
-1 mm.
+The paper's 3 minutes (constant spin) and 10 minutes (exact) for a 5 s flight were measured on a
+233 MHz Pentium with ode23s of Matlab. Here the run time is that of one flight whose end is
+accurate to 1 mm.
 """
 
 from dataclasses import dataclass, replace
@@ -18,10 +18,10 @@ from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig05_typical_flight import LAUNCH
+from disc_sim_ros.paper.figure_files import PaperFigure
 from disc_sim_ros.physics.flight import MODELS, Setup, fly
 from disc_sim_ros.physics.launch import Launch
 
-KEY = 'models'
 TITLE = 'Rigid-body models: how far apart, and how long they take'
 CONDITIONS = (
     'Launch of Fig. 5 for 5 s, in a, b with a wobble of p = 5 rad/s at 10 % damping, in c, d '
@@ -30,11 +30,11 @@ CONDITIONS = (
 )
 DURATION = 5.0  # s
 WOBBLE = 5.0  # rad/s
-STEPS = (0.05, 0.04, 0.03, 0.02, 0.015, 0.01, 7e-3, 5e-3, 3e-3, 2e-3, 1e-3, 5e-4)  # s, tried
+STEPS = (0.05, 0.04, 0.03, 0.02, 0.015, 0.01, 7e-3, 5e-3, 3e-3, 2e-3, 1e-3, 5e-4)  # s, candidates
 CLOSE = 1e-3  # m
 RATIOS = (0.29, 0.6, 1.1, 2.2)
 PAPER_SECONDS = {'exact': 600.0, 'constant_spin': 180.0}
-BLOCKS, FLIGHTS = 12, 10  # timed, and flights in each
+BLOCKS, FLIGHTS = 12, 10  # timed blocks, and flights per block
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Data:
     """Flights of 5 s with each model, and run times.
 
     Attributes:
-        curves: Without a wobble, those of one damping after those of the other.
-        wobbling: Released with a wobble, 10 % damping.
-        step: Longest step that ends within 1 mm [s], rows `MODELS`, columns `RATIOS`.
+        curves: Flights without a wobble, one damping after the other.
+        wobbling: Flights with a wobble, 10 % damping.
+        step: Longest step with an error below 1 mm [s], rows `MODELS`, columns `RATIOS`.
         seconds: CPU time of one flight at that step [s], likewise.
     """
 
@@ -59,9 +59,9 @@ class Data:
 
     def apart(self, model: str, share: float) -> FloatArray:
         """Return the distance of a model from the exact one at each sample [m]."""
-        found = self.of(share)
+        curves = self.of(share)
         distance: FloatArray = np.linalg.norm(
-            found[model].t.position - found['exact'].t.position, axis=1
+            curves[model].t.position - curves['exact'].t.position, axis=1
         )
         return distance
 
@@ -89,14 +89,14 @@ def _end(launch: Launch, setup: Setup) -> FloatArray:
 
 
 def longest_step(model: str, ratio: float) -> float:
-    """Return the longest of `STEPS` with which a flight ends within 1 mm [s]."""
+    """Return the longest of `STEPS` with which the end of a flight is accurate to 1 mm [s]."""
     launch = _timed_launch(ratio)
     disc = conditions.frisbee()
     finest = _end(launch, Setup(disc=disc, model=model, step=1e-4))
     for step in STEPS:
         try:
             end = _end(launch, Setup(disc=disc, model=model, step=step))
-        except DiscSimError:  # refused or lost: too long for this launch
+        except DiscSimError:  # refused, or lost: the step is too long for this launch
             continue
         if np.linalg.norm(end - finest) < CLOSE:
             return step
@@ -104,7 +104,7 @@ def longest_step(model: str, ratio: float) -> float:
 
 
 def _seconds(steps: list[list[float]]) -> FloatArray:
-    """Return the CPU time of one flight, the least of some blocks [s]; the models take turns."""
+    """Return the CPU time of one flight, least of several interleaved blocks [s]."""
     least = np.full((len(MODELS), len(RATIOS)), np.inf)
     for _ in range(BLOCKS):
         for j, ratio in enumerate(RATIOS):
@@ -164,7 +164,7 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def findings(data: Data) -> list[str]:
-    """Say how far apart the models are and what each costs."""
+    """Return the distances between the models, and the run time of each."""
     lines = []
     for share in conditions.SHARES:
         for model in ('constant_spin', 'precession'):
@@ -179,7 +179,7 @@ def findings(data: Data) -> list[str]:
         apart = np.linalg.norm(curve.t.position - exact, axis=1)
         lines.append(
             f'{curve.label}, with the wobble: {apart[round(4.0 * 500)]:.3f} m from exact after '
-            '4 s. The precession model has no wobble to fly through.'
+            '4 s. The precession model has no wobble.'
             if 'precession' in curve.label
             else f'{curve.label}, with the wobble: {apart[round(4.0 * 500)]:.3f} m from exact '
             'after 4 s.'
@@ -193,13 +193,13 @@ def findings(data: Data) -> list[str]:
     ratio = data.seconds[0, 0] / data.seconds[1, 0]
     lines.append(
         f'exact takes {ratio:.1f} times as long as constant_spin (paper: 3.3 times), because in '
-        'axes that do not spin neither of them has to follow the spin.'
+        'axes that do not spin neither model has to resolve the spin.'
     )
     return lines
 
 
 def table(data: Data) -> str:
-    """Return steps and run times as CSV, the only numbers here that no seed repeats."""
+    """Return steps and run times as CSV; run times differ from run to run."""
     rows = [
         [model, ratio, data.step[i, j], data.seconds[i, j]]
         for i, model in enumerate(MODELS)
@@ -209,14 +209,21 @@ def table(data: Data) -> str:
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.wobbling[0]
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='models',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

@@ -1,4 +1,4 @@
-"""The roll-rate law: eqn 64 as printed, corrected, and simulated; and eqn 54 along Fig. 5."""
+"""The roll-rate law: eqn 64 as printed, corrected and simulated, and eqn 54 along Fig. 5."""
 
 from dataclasses import dataclass
 import math
@@ -12,29 +12,29 @@ from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig05_typical_flight import DURATION, LAUNCH
 from disc_sim_ros.paper.fig10_similarity import ALPHA, GRAVITY, SPEED, plate
+from disc_sim_ros.paper.figure_files import PaperFigure
 from disc_sim_ros.physics import theory
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.trajectory import Trajectory
 
-KEY = 'roll_rate'
 TITLE = 'Roll rate: eqns 54 and 64 as printed, corrected and simulated'
 CONDITIONS = (
     'a: flat plate of Fig. 10, exact model, no damping, mean over the first nutation. b: throw of '
     'Fig. 5, exact model, table aerodynamics, 10 % damping.\nMoments in axes 3 (body) in both.'
 )
 RATIOS = np.geomspace(0.7, 3.8, 12)
-SAMPLES = 200  # of one nutation
+SAMPLES = 200  # per nutation
 
 
 @dataclass(frozen=True)
 class Data:
-    """Roll rates by the laws and by integration.
+    """Roll rates from the laws and from the simulation.
 
     Attributes:
         printed: 8 k_n / AdvR at `RATIOS` [1].
         corrected: 4 k_n / AdvR [1].
-        simulated: p V / g of the exact model, mean over one nutation [1].
+        simulated: p V / g of the exact model, mean over the first nutation [1].
         flight: The throw of Fig. 5.
     """
 
@@ -83,7 +83,7 @@ def law_54(t: Trajectory) -> FloatArray:
     """Return -M / (r I_z) along a flight of the paper's disc, M the steady moment [rad/s]."""
     disc = conditions.frisbee()
     if disc.table is None:
-        raise ValueError("the paper's disc has a table")
+        raise ValueError('the disc frisbee needs a table')
     C_M = np.interp(t.alpha, disc.table.alpha, disc.table.coefficients[:, 2])
     M = 0.5 * 1.225 * t.airspeed**2 * disc.area * disc.diameter * C_M
     return theory.precession_roll_rate(M, t.spin, disc.inertia_axial)
@@ -91,7 +91,7 @@ def law_54(t: Trajectory) -> FloatArray:
 
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
-    """Draw the law over the advance ratio, and the roll rate along the throw of Fig. 5."""
+    """Draw the law against the advance ratio, and the roll rate along the throw of Fig. 5."""
     figure = style.sheet(4.9, TITLE, CONDITIONS)
     law, along = figure.subplots(1, 2)
     dashed = (0, (4, 1.6))
@@ -119,41 +119,48 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def factor(data: Data) -> FloatArray:
-    """Return simulated p V / g by k_n / AdvR: 8 as printed, 4 as corrected, shape (12,)."""
-    found: FloatArray = 4.0 * data.simulated / data.corrected
-    return found
+    """Return simulated p V / g over k_n / AdvR: 8 as printed, 4 as corrected, shape (12,)."""
+    ratio: FloatArray = 4.0 * data.simulated / data.corrected
+    return ratio
 
 
 def findings(data: Data) -> list[str]:
-    """Say what stands in the place of the printed 8."""
-    found = factor(data)
+    """Return the simulated value of the printed factor 8."""
+    simulated = factor(data)
     t = data.flight.t
     apart = float(np.sqrt(np.mean((roll_rate(t) - law_54(t)) ** 2)))
     printed = float(np.sqrt(np.mean((roll_rate(t) + 2.0 * law_54(t)) ** 2)))
     return [
-        f'Simulated roll rate by k_n / AdvR: {found[-1]:.2f} at AdvR {RATIOS[-1]:.1f}, '
-        f'{found[0]:.2f} at AdvR {RATIOS[0]:.1f}. Eqn 64 prints 8; corrected it is 4.',
+        f'Simulated p V / g over k_n / AdvR: {simulated[-1]:.2f} at AdvR {RATIOS[-1]:.1f}, '
+        f'{simulated[0]:.2f} at AdvR {RATIOS[0]:.1f}. Eqn 64 prints 8; corrected it is 4.',
         f'Along the throw of Fig. 5 the simulated rate is {apart:.2f} rad/s rms from −M / (r I_z) '
         f'and {printed:.2f} rad/s from 2 M / (r I_z) as printed.',
     ]
 
 
 def table(data: Data) -> str:
-    """Return the law over the advance ratio as CSV."""
+    """Return the law against the advance ratio as CSV."""
     header = ['AdvR', 'p_hat_printed', 'p_hat_corrected', 'p_hat_simulated']
     columns = (RATIOS, data.printed, data.corrected, data.simulated)
     return conditions.csv_text(header, np.column_stack(columns))
 
 
 def example(data: Data) -> Curve:
-    """Return the flight that is integrated a second time, independently."""
+    """Return the flight to integrate a second time."""
     return data.flight
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write this figure alone."""
-    return figure_files.main(sys.modules[__name__], arguments)
+FIGURE = PaperFigure(
+    key='roll_rate',
+    title=TITLE,
+    conditions=CONDITIONS,
+    compute=compute,
+    plot=plot,
+    findings=findings,
+    table=table,
+    example=example,
+)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(figure_files.main(FIGURE))

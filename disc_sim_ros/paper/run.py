@@ -1,4 +1,4 @@
-"""The parts of a run of `paper_figures`, each of which may run in a process of its own."""
+"""The parts of a run of `paper_figures`; each may run in a process of its own."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import time
 
 from disc_sim_ros import files
 from disc_sim_ros.paper import figure_files, report
-from disc_sim_ros.paper.figure_files import Written
+from disc_sim_ros.paper.figure_files import WrittenFigure
 from disc_sim_ros.paper.figures import FIGURES
 from disc_sim_ros.paper.statements import table
 from disc_sim_ros.paper.statements.rule import Result
@@ -19,12 +19,12 @@ PARTS = (*FIGURES, STATEMENTS)
 
 @dataclass(frozen=True)
 class Done:
-    """A part that is done: a figure, or the table of statements."""
+    """A finished part: a figure, or the table of statements."""
 
     key: str
     title: str
     seconds: float
-    figure: Written | None = None
+    figure: WrittenFigure | None = None
     results: tuple[Result, ...] | None = None
 
 
@@ -50,7 +50,7 @@ def write_report(done: Sequence[Done], folder: Path, *, dark: bool) -> report.Re
     ordered = sorted(done, key=lambda one: PARTS.index(one.key))
     figures = tuple(one.figure for one in ordered if one.figure is not None)
     results = next((one.results for one in ordered if one.results is not None), None)
-    found = report.Report(figures, results, dark)
-    files.write_whole(folder / 'report.md', report.markdown(found).encode())
-    files.write_whole(folder / 'report.html', report.html(found).encode())
-    return found
+    paper_report = report.Report(figures, results, dark)
+    files.write_whole(folder / 'report.md', report.markdown(paper_report).encode())
+    files.write_whole(folder / 'report.html', report.html(paper_report).encode())
+    return paper_report

@@ -1,4 +1,4 @@
-"""How the figures are drawn: light and dark, colours for every eye, discs along the path."""
+"""Style of the figures: light and dark, colours for the colour-blind, discs along the path."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -27,7 +27,7 @@ SIDE, TOP = 'side', 'top'
 
 @dataclass(frozen=True)
 class Look:
-    """Colours of one background. Those of curves are Okabe and Ito's, safe for every eye."""
+    """Colours for one background; those of curves are safe for the colour-blind (Okabe, Ito)."""
 
     name: str
     face: str
@@ -37,7 +37,7 @@ class Look:
     tenth: str  # 10 % of it
     third: str
     fourth: str
-    ramp: tuple[float, float]  # part of the colour map for a family of curves
+    ramp: tuple[float, float]  # part of the colour map used for a family of curves
 
 
 LIGHT = Look('light', '#ffffff', '#1a1a1a', '#c4c4c4', '#0072b2', '#d55e00', '#009e73', '#8a5a83',
@@ -51,7 +51,7 @@ Data = TypeVar('Data')
 
 @contextmanager
 def style(look: Look) -> Iterator[None]:
-    """Draw with the fonts and colours of `look`."""
+    """Use the fonts and colours of `look` in this block."""
     with mpl.rc_context(
         {
             'font.size': 11,
@@ -81,7 +81,7 @@ def style(look: Look) -> Iterator[None]:
 
 
 def styled(plot: Callable[[Data, Look], Figure]) -> Callable[[Data, Look], Figure]:
-    """Let a plot function draw in the style of its look."""
+    """Decorate a plot function to draw in the style of its look."""
 
     @wraps(plot)
     def within(data: Data, look: Look = LIGHT) -> Figure:
@@ -92,7 +92,7 @@ def styled(plot: Callable[[Data, Look], Figure]) -> Callable[[Data, Look], Figur
 
 
 def sheet(height: float, title: str, conditions: str) -> Figure:
-    """Return an empty figure, `height` in inches, with what it was computed with below it."""
+    """Return an empty figure with a title above and conditions below it; height in inches."""
     layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.06)  # inches
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
@@ -102,7 +102,7 @@ def sheet(height: float, title: str, conditions: str) -> Figure:
 
 
 def image(figure: Figure, kind: str, look: Look) -> bytes:
-    """Return a figure as the bytes of a PNG (256 colours) or SVG, the same at every run."""
+    """Return a figure as the bytes of a PNG (256 colours) or SVG; the same in every run."""
     buffer = BytesIO()
     with style(look):
         if kind == 'svg':
@@ -114,18 +114,18 @@ def image(figure: Figure, kind: str, look: Look) -> bytes:
             picture = Image.fromarray(pixels).convert('RGB')
             few = picture.quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
             few.save(buffer, format='png', compress_level=9, dpi=(DPI, DPI))
-    figure.set_layout_engine('none')  # laid out now; not again for the next format
+    figure.set_layout_engine('none')  # keep the layout for the next format
     return buffer.getvalue()
 
 
 def family(values: Sequence[float], look: Look) -> list[Any]:
-    """Return colours for an ordered family of curves, equal in order of brightness for all."""
+    """Return colours for an ordered family of curves, in the order of their brightness."""
     viridis = mpl.colormaps['viridis']
     return [viridis(x) for x in np.linspace(*look.ramp, len(values))]
 
 
 def view(points: FloatArray, side: str) -> FloatArray:
-    """Return X and height, or X and Y, of points in axes 1 of shape (..., 3), shape (..., 2)."""
+    """Return X and height, or X and Y, of points in axes 1; shape (..., 3) to (..., 2)."""
     across = frames.flip(points[..., 2]) if side == SIDE else points[..., 1]
     return np.stack([points[..., 0], across], axis=-1)
 
@@ -134,9 +134,9 @@ def views(axis: Axes, side: str, *, equal: Literal['box', 'datalim', 'no'] = 'da
     """Label a side view (height up) or a view from above (Y to the right of the flight, down).
 
     Args:
-        axis: Of the panel.
+        axis: The panel.
         side: `SIDE` or `TOP`.
-        equal: What gives way for equal scales: 'datalim' or 'box'; 'no' for unequal ones.
+        equal: What changes to make the scales equal: 'datalim' or 'box'; 'no' for unequal scales.
     """
     axis.set_xlabel('X forward, m')
     axis.set_ylabel('height −Z, m' if side == SIDE else 'Y right, m')
@@ -147,7 +147,7 @@ def views(axis: Axes, side: str, *, equal: Literal['box', 'datalim', 'no'] = 'da
 
 
 def path(axis: Axes, t: Trajectory, side: str, *, scale: float = 1.0, **line: Any) -> None:
-    """Draw the path of a flight, lengths times `scale`."""
+    """Draw the path of a flight; lengths are multiplied by `scale`."""
     axis.plot(*view(scale * t.position, side).T, **line)
 
 
@@ -162,9 +162,9 @@ def discs(
     scale: float = 1.0,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
-    """Draw discs along a path, as they are seen in the projection, `size` times enlarged.
+    """Draw projected discs along a path, `size` times enlarged.
 
-    A disc seen from above is filled more strongly than one seen from below.
+    A disc that shows its upper side is filled more strongly than one that shows its underside.
 
     Args:
         axis: A view made with `views`.
@@ -172,14 +172,14 @@ def discs(
         side: `SIDE` or `TOP`.
         every: Time between discs [s].
         size: Enlargement.
-        colour: Of the path.
+        colour: Colour of the path.
         scale: Factor of all lengths.
-        start: Added to all positions, axes 1 [m].
+        start: Offset of all positions, axes 1 [m].
     """
     rate = 1.0 / (t.t[1] - t.t[0])
     chosen = np.arange(0, len(t), max(1, round(every * rate)))
     outlines = scale * view(disc_rims(t, size)[chosen] + start, side)
-    n = t.normal[chosen]  # out of the underside; from above and from the right the upper side
+    n = t.normal[chosen]  # points out of the underside
     upper = n[:, 2] > 0.0 if side == TOP else n[:, 1] < 0.0
     for shown, alpha in ((upper, 0.45), (~upper, 0.15)):
         fill = mpl.colors.to_rgba(colour, alpha)
@@ -201,5 +201,5 @@ def disc_rims(t: Trajectory, size: float) -> FloatArray:
 
 
 def letter(axis: Axes, name: str, title: str) -> None:
-    """Head a panel with its letter."""
+    """Write the letter of a panel, and a title, above it."""
     axis.set_title(f'({name}) {title}')

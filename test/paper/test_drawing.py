@@ -18,20 +18,20 @@ pytestmark = pytest.mark.xdist_group('figures')  # computed once
 
 @pytest.mark.parametrize('key', FIGURES)
 def test_each_figure_names_damping_and_moment_axes_and_labels_its_axes(key):
-    module = FIGURES[key]
-    assert 'damping' in module.CONDITIONS
-    assert 'axes 3' in module.CONDITIONS
-    figure = module.plot(computed(key), LIGHT)
+    paper_figure = FIGURES[key]
+    assert 'damping' in paper_figure.conditions
+    assert 'axes 3' in paper_figure.conditions
+    figure = paper_figure.plot(computed(key), LIGHT)
     written = ' '.join(text.get_text() for text in figure.texts)
-    assert module.TITLE in written
-    assert module.CONDITIONS in written  # in the picture itself
+    assert paper_figure.title in written
+    assert paper_figure.conditions in written  # in the picture itself
     for text in figure.texts:  # title and conditions are not cut off
         assert text.get_window_extent(figure.canvas.get_renderer()).x1 < figure.bbox.x1
     for axis in figure.axes:
         shared = not axis.xaxis.get_tick_params()['labelbottom']
         assert axis.get_ylabel()
         assert axis.get_xlabel() or shared
-    findings = module.findings(computed(key))
+    findings = paper_figure.findings(computed(key))
     assert findings
     assert all(finding.endswith('.') for finding in findings)
 

@@ -11,11 +11,11 @@ from disc_sim_ros.paper import (
     crosscheck,
     fig04_flight_f2302,
     fig10_similarity,
+    fig11_12_spirals,
     figure_files,
     report,
     style,
 )
-from disc_sim_ros.paper import fig11_spiral_turn as fig11
 from disc_sim_ros.paper.conditions import PRINTED, TENTH
 from paper.computed_figures import FIGURES, computed, judged
 
@@ -57,7 +57,7 @@ def test_the_rows_are_what_the_figures_give():
 
     as_printed, tenth = computed('11').curves[:2]
     for curve in (as_printed, tenth):
-        alpha, speed = fig11.mean(curve, 'alpha_deg'), fig11.mean(curve, 'V_m_s')
+        alpha, speed = (fig11_12_spirals.mean(curve, name) for name in ('alpha_deg', 'V_m_s'))
         assert f'{alpha:.1f}°, {speed:.1f} m/s' in row('Fig. 11')
     depths = {c.value: c.flight.end.Z for c in computed('12').curves if c.share == PRINTED}
     assert f'{depths[0.0]:.1f} m without gravity, {depths[9.81]:.1f} m with' in row('Fig. 12')

@@ -14,8 +14,7 @@ from disc_sim_ros.paper import (
     fig06_launch_conditions,
     fig07_range,
     fig10_similarity,
-    fig11_spiral_turn,
-    fig12_spiral_roll,
+    fig11_12_spirals,
     roll_rate_law,
 )
 from disc_sim_ros.paper.conditions import HUNDREDTH, PRINTED, TENTH
@@ -149,8 +148,8 @@ def test_fig_11_settles_where_documented():
     printed, tenth, axes_4, exact = computed('11').curves
     for name, expected in (('alpha_deg', 17.6), ('lambda_deg', 35.7), ('V_m_s', 6.5)):
         # From an earlier integration: 17.7, 35.5, 6.5 in the exact model.
-        assert fig11_spiral_turn.mean(printed, name) == pytest.approx(expected, abs=0.15)
-        assert fig11_spiral_turn.mean(exact, name) == pytest.approx(expected, abs=0.15)
+        assert fig11_12_spirals.mean(printed, name) == pytest.approx(expected, abs=0.15)
+        assert fig11_12_spirals.mean(exact, name) == pytest.approx(expected, abs=0.15)
     assert exact.flight.end.r == pytest.approx(46.9, abs=0.05)  # docs/deviations.md
     assert axes_4.flight.setup.moment_axes == 'wind'
     assert tenth.flight.setup.disc.C_Lp == pytest.approx(-0.13)
@@ -162,7 +161,7 @@ def test_fig_11_settles_where_documented():
 )
 def test_fig_12_ends_where_documented(gravity, share, depth):
     # docs/deviations.md has the exact model; constant spin differs by its 2 % of spin.
-    exact = fig12_spiral_roll.exact_flight(gravity, share)
+    exact = fig11_12_spirals.exact_roll(gravity, share)
     assert pytest.approx(depth, abs=0.05) == exact.end.Z
     curve = next(c for c in computed('12').curves if c.share == share and c.value == gravity)
     assert pytest.approx(depth, rel=0.01) == curve.flight.end.Z

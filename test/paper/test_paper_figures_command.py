@@ -14,7 +14,7 @@ import pytest
 from disc_sim_ros.cli import paper_figures
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.paper import report, run
-from disc_sim_ros.paper.figure_files import Written
+from disc_sim_ros.paper.figure_files import WrittenFigure
 
 pytestmark = pytest.mark.xdist_group('paper_figures')
 
@@ -96,7 +96,7 @@ def test_the_reports_are_whole(made):
 
 
 def test_a_flight_that_is_off_is_not_called_close():
-    far = Written('7', 'Fig. 7: x', 'c', ('f.',), ('fig07.csv',), 'θ 10°', 0.02, 1.0)
+    far = WrittenFigure('7', 'Fig. 7: x', 'c', ('f.',), ('fig07.csv',), 'θ 10°', 0.02, 1.0)
     found = report.Report((far,), None, dark=True)
     assert 'NOT within 1 cm' in ' '.join(found.summary())
     assert found.checks()[0][-1] == 'NOT within 1 cm'

@@ -1,1 +1,1 @@
-"""Every statement of the paper's text that has a number, beside what this model gives."""
+"""Every statement of the paper's text with a number, compared with this simulator."""

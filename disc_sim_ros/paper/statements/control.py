@@ -5,16 +5,15 @@ from functools import cache
 import numpy as np
 
 from disc_sim_ros.paper import fig10_similarity as fig10
-from disc_sim_ros.paper import fig11_spiral_turn as fig11
-from disc_sim_ros.paper import fig12_spiral_roll as fig12
+from disc_sim_ros.paper import fig11_12_spirals as spirals
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.statements.rule import Ours, Statement
 from disc_sim_ros.paper.statements.theory import fig03
 from disc_sim_ros.physics import theory
 
 plates = cache(fig10.compute)
-turns = cache(fig11.compute)
-rolls = cache(fig12.compute)
+turns = cache(spirals.compute_turn)
+rolls = cache(spirals.compute_roll)
 
 
 def _lift_by_weight(diameter: float) -> float:
@@ -31,13 +30,13 @@ def _turn(share: float) -> Curve:
 
 
 def _mean(name: str) -> Ours:
-    return lambda share: fig11.mean(_turn(share), name)
+    return lambda share: spirals.mean(_turn(share), name)
 
 
 def _swing(share: float) -> float:
-    """Return half the swing of the angle of attack while it should be steady [degrees]."""
+    """Return the amplitude of the angle of attack while it should be steady [degrees]."""
     t = _turn(share).t
-    steady = (t.t >= fig11.SETTLED[0]) & (t.t <= fig11.SETTLED[1])
+    steady = (t.t >= spirals.SETTLED[0]) & (t.t <= spirals.SETTLED[1])
     return float(np.ptp(np.degrees(t.alpha[steady])) / 2)
 
 
@@ -50,7 +49,7 @@ def _depth(share: float, *, gravity: bool) -> float:
 
 
 def _alpha_off(share: float) -> float:
-    """Return the largest mean over 0.5 s of the angle of attack away from -3 degrees."""
+    """Return the largest distance from -3 degrees of the angle of attack, in means over 0.5 s."""
     window = round(0.5 * 100)
     alpha = np.degrees(_roll(share, gravity=False).t.alpha)
     means = alpha[: len(alpha) // window * window].reshape(-1, window).mean(axis=1)
@@ -58,7 +57,7 @@ def _alpha_off(share: float) -> float:
 
 
 def _path_swing(share: float, *, gravity: bool) -> float:
-    lowest, highest = fig12.descent_angle(_roll(share, gravity=gravity))
+    lowest, highest = spirals.descent_angle(_roll(share, gravity=gravity))
     return highest - lowest
 
 

@@ -30,7 +30,7 @@ def _best(name: str, spacing: float) -> Ours:
 
 
 def _sensitivity(share: float) -> float:
-    """Return the drop of range by that of duration, relative, from their best to 30 degrees."""
+    """Return the relative loss of range from the best pitch to 30 degrees, by that of duration."""
     data = pitches()
     at_30 = int(np.flatnonzero(data.pitch == 30.0)[0])
     far, long = data.range[_row(share)], data.duration[_row(share)]
@@ -42,7 +42,7 @@ def _level(ratio: float, share: float) -> Flight:
 
 
 def _bend(ratio: float) -> Ours:
-    """Return the way to the side after 4 s by the way forward [%]."""
+    """Return the sideways distance after 4 s relative to the forward distance [%]."""
 
     def bend(share: float) -> float:
         end = _level(ratio, share).end
@@ -52,7 +52,7 @@ def _bend(ratio: float) -> Ours:
 
 
 def _depth_against(ratio: float, other: float) -> Ours:
-    """Return by how much lower one launch is than another after 2 s [m]."""
+    """Return how much lower one launch is than another after 2 s [m]."""
 
     def depth(share: float) -> float:
         at = round(2.0 * conditions.RATE)
@@ -63,7 +63,7 @@ def _depth_against(ratio: float, other: float) -> Ours:
 
 
 def _first_second_without_spin(share: float) -> float:
-    """Return the least pitch of a disc without spin within its first second [degrees]."""
+    """Return the least pitch of a disc without spin in the first second [degrees]."""
     t = _level(0.0, share).trajectory
     return float(np.degrees(t.euler[: round(conditions.RATE), 1]).min())
 
@@ -74,7 +74,7 @@ def _turns_over_without_spin(share: float) -> float:
 
 
 def _sideways(share: float) -> float:
-    """Return the most that the launches of panel d land to the side [m]."""
+    """Return the largest sideways distance of the landings of panel d [m]."""
     flights = (
         conditions.flown(fig06.pitch_launch(pitch), share, ground=True) for pitch in fig06.PITCHES
     )
@@ -82,7 +82,7 @@ def _sideways(share: float) -> float:
 
 
 def _alpha_by_pitch(share: float) -> float:
-    """Return the longest way forward in 4 s at alpha 60 degrees, by that at 0 [1]."""
+    """Return the greatest forward distance in 4 s at alpha 60 degrees, relative to 0 [1]."""
 
     def far(alpha: float) -> float:
         launch = fig06.alpha_launch(alpha)
@@ -93,7 +93,7 @@ def _alpha_by_pitch(share: float) -> float:
 
 
 def _speed_left_at_90(share: float) -> float:
-    """Return what is left of the horizontal speed after 1 s at alpha 90 degrees [m/s]."""
+    """Return the horizontal speed after 1 s at alpha 90 degrees [m/s]."""
     t = conditions.flown(fig06.alpha_launch(90.0), share, duration=fig06.LONGEST).trajectory
     return float(np.hypot(*t.velocity[round(conditions.RATE), :2]))
 
@@ -103,18 +103,18 @@ def _crossing(ratio: float) -> Ours:
 
 
 def _over_ratios(quantity: str, *, most: bool) -> Ours:
-    """Return the least or the most that the assumed advance ratios give."""
+    """Return the least or the greatest value for the assumed advance ratios."""
 
     def bound(share: float) -> float:
-        found: list[float] = [getattr(landings(), quantity)(ratio, share) for ratio in ASSUMED]
-        return max(found) if most else min(found)
+        values: list[float] = [getattr(landings(), quantity)(ratio, share) for ratio in ASSUMED]
+        return max(values) if most else min(values)
 
     return bound
 
 
 @cache
 def _straightest(ratio: float, share: float) -> float:
-    """Return the roll of the straightest path in the first 2 s, of whole degrees [degrees]."""
+    """Return the roll with the straightest path in the first 2 s, in whole degrees [degrees]."""
     until = round(2.0 * conditions.RATE)
 
     def bend(roll: float) -> float:
@@ -135,7 +135,7 @@ def _landing_side(roll: float) -> Ours:
 
 
 def _bends(share: float) -> float:
-    """Return how often X turns along the locus, at rolls 10 degrees apart; of an S twice."""
+    """Return the number of turning points of X along the landings, at rolls 10 degrees apart."""
     X = landings().of(fig06.ADV_R_ROLL, share)[::10, 0]
     slope = np.sign(np.diff(X))
     return float(np.count_nonzero(slope[1:] != slope[:-1]))

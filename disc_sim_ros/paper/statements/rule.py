@@ -1,7 +1,7 @@
-"""What a statement is, and the rule that gives its verdict.
+"""A statement of the paper, and the rule for its verdict.
 
-A statement holds the number as it is printed, and a function that computes ours from a share of
-the printed damping. The verdict is never typed: it follows from both, by `judge`.
+A statement holds the number as it is printed, and a function that computes our number from a share
+of the printed damping. The verdict is never written by hand: `judge` computes it from both.
 """
 
 from collections.abc import Callable
@@ -23,21 +23,22 @@ class Statement:
     """One number of the paper's text.
 
     Attributes:
-        where: Section or figure.
-        says: What the number is, in few words.
-        number: The number as printed, with '>' or '<' before it where it is a bound.
+        where: Section or figure of the paper.
+        says: Name of the number, in a few words.
+        number: The number as printed; '>' or '<' before it marks a bound.
         unit: Its unit; '' for none.
-        words: What the text says in words where it has no number; `number` is then our reading.
-        ours: Our number from a share of the printed damping; None where none can be computed.
-        about: The text says about, around or approximately.
-        tolerance: Instead of the one that `rounding` gives.
-        reason: Why that tolerance.
-        damped: Whether roll and pitch damping have a part in it; else one number is shown.
-        taken: The number is an input of ours, so that meeting it proves nothing.
-        open_value: A launch value that the text does not give, and what was assumed; `ours` then
-            returns a bound of what the assumed values give, and `upper` the other.
+        words: The words of a text without a number; `number` is then our reading of them.
+        ours: Computes our number from a share of the printed damping; None if it cannot be
+            computed.
+        about: True if the text says about, around or approximately.
+        tolerance: Tolerance to use instead of that of `rounding`.
+        reason: Reason for this tolerance.
+        damped: True if the number depends on roll and pitch damping.
+        taken: True if the number is an input of the simulator: agreement is then no evidence.
+        open_value: A launch value that the text does not give, and the assumed values; `ours` and
+            `upper` then return the bounds of the results for these values.
         upper: See `open_value`.
-        why: Why ours differs, or why there is none.
+        why: Why our number differs, or why there is none.
     """
 
     where: str
@@ -57,12 +58,12 @@ class Statement:
 
     @property
     def value(self) -> float:
-        """The printed number."""
+        """Return the printed number."""
         return float(self.number.lstrip('<>'))
 
     @property
     def allowed(self) -> float:
-        """How far ours may be from it [unit]."""
+        """Return the allowed distance of our number from the printed one [unit]."""
         if self.tolerance is not None:
             return self.tolerance
         return 0.0 if self.number[0] in '<>' else rounding(self.number, about=self.about)
@@ -70,15 +71,16 @@ class Statement:
 
 @dataclass(frozen=True)
 class Result:
-    """A statement, what we get and the verdict.
+    """A statement, our numbers and the verdict.
 
     Attributes:
         statement: The statement.
-        ours: Our numbers, for each of `paper.SHARES`; one without damping; none if not computed.
-        verdict: One of the four words.
-        detail: By how much and why, or with which damping.
-        met: Whether each of `paper.SHARES` meets it; empty where damping has no part or nothing is
-            judged.
+        ours: Our numbers, one for each of `conditions.SHARES`; a single one if damping has no
+            influence; none if there is no computation.
+        verdict: One of the four verdicts.
+        detail: Difference and its cause, or the damping that reproduces the number.
+        met: For each of `conditions.SHARES`, True if it reproduces the number; empty if damping
+            has no influence or nothing was judged.
     """
 
     statement: Statement
@@ -91,8 +93,8 @@ class Result:
 def rounding(number: str, *, about: bool) -> float:
     """Return half of the step to which a printed number is rounded.
 
-    The step is one of its last digit that is not 0: 4.34 is 0.01, 40 is 10. Of a number that the
-    text calls approximate, a last 5 counts as rounded to fives: about 15 is 15 +- 2.5.
+    The step is one unit of the last digit other than 0: 0.01 for 4.34, 10 for 40. A last 5 of a
+    number that the text calls approximate is taken as rounded to fives: about 15 is 15 +- 2.5.
     """
     digits = number.lstrip('-')
     if float(digits) == 0.0:
@@ -110,7 +112,7 @@ def rounding(number: str, *, about: bool) -> float:
 
 
 def judge(statement: Statement) -> Result:
-    """Compute ours and give the verdict."""
+    """Compute our numbers and the verdict of a statement."""
     if statement.ours is None:
         return Result(statement, (), NOT_REPRODUCIBLE, statement.why)
     shares = SHARES if statement.damped else (PRINTED,)
@@ -134,7 +136,7 @@ def judge(statement: Statement) -> Result:
 
 
 def distance(statement: Statement, ours: float) -> float:
-    """Return how far ours is from the printed number, or on the wrong side of a bound [unit]."""
+    """Return the distance from the printed number, or beyond the bound [unit]."""
     if not math.isfinite(ours):
         return math.inf
     if statement.number[0] == '>':
@@ -145,7 +147,7 @@ def distance(statement: Statement, ours: float) -> float:
 
 
 def _judge_open(statement: Statement, lower: list[float], upper: list[float]) -> Result:
-    """Judge a statement about a launch that the text does not give in full."""
+    """Judge a statement about a launch that the text does not give completely."""
     shown = tuple(
         f'{_shown(min(a, b))} to {_shown(max(a, b))}' for a, b in zip(lower, upper, strict=True)
     )

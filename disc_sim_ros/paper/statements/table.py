@@ -1,4 +1,4 @@
-"""All statements, judged, and the table as text."""
+"""All statements with their verdicts, and the table as text."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ HEADER = ('where', 'what', 'paper', 'ours, damping as printed', 'ours, 10 % damp
 
 
 def evaluate() -> tuple[Result, ...]:
-    """Judge all statements; the results can go to another process, without the functions."""
+    """Judge all statements; the results hold no functions, so that they can be pickled."""
     results = (judge(statement) for statement in STATEMENTS)
     return tuple(
         replace(result, statement=replace(result.statement, ours=None, upper=None))
@@ -34,19 +34,19 @@ def evaluate() -> tuple[Result, ...]:
 
 
 def tally(results: tuple[Result, ...]) -> dict[str, int]:
-    """Return how many statements got each verdict."""
+    """Return the number of statements with each verdict."""
     words = (REPRODUCED, DIFFERS, NOT_REPRODUCIBLE, TAKEN)
     return {word: sum(result.verdict == word for result in results) for word in words}
 
 
 def met_by_damping(results: tuple[Result, ...]) -> tuple[int, int, int]:
-    """Return how many numbers depend on damping, and how many each damping meets."""
+    """Return the number of results that depend on damping, and how many each damping meets."""
     judged = [result.met for result in results if result.met]
     return len(judged), sum(met[0] for met in judged), sum(met[1] for met in judged)
 
 
 def cells(result: Result) -> tuple[str, ...]:
-    """Return one row of the table, below `HEADER`."""
+    """Return one row of the table, with the columns of `HEADER`."""
     statement = result.statement
     about = 'about ' if statement.about else ''
     if statement.words:

@@ -1,4 +1,4 @@
-"""Statements of the sections before the results: properties, models, run time, Fig. 3."""
+"""Statements of the sections before the results: coefficients, models, run time, Fig. 3."""
 
 from functools import cache
 import math
@@ -27,7 +27,7 @@ _AREA, _SPEED = 0.057, 13.42  # m^2 and m/s, Hummel 2003
 
 
 def _from_hummel(slope: float) -> float:
-    """Return a damping per c / (2 V) from her slope [1 / (rad/s)]."""
+    """Return a damping per c / (2 V) from Hummel's slope [1 / (rad/s)]."""
     return slope * 2.0 * _SPEED / (2.0 * math.sqrt(_AREA / math.pi))
 
 
@@ -48,7 +48,7 @@ def _spin_lost(share: float) -> float:
 
 
 def _apart(share: float) -> float:
-    """Return how far constant spin and exact are at most, by the range, in 4 s [%]."""
+    """Return the largest distance between constant spin and exact in 4 s, over the range [%]."""
     data = models()
     last = round(4.0 * conditions.RATE)
     way = data.of(share)['exact'].t.position[last, 0]

@@ -1,4 +1,4 @@
-"""Statements about Figs. 4 and 5, of the text and of what was read off the drawn paths."""
+"""Statements about Figs. 4 and 5, from the text and read off the drawn paths."""
 
 from functools import cache
 
@@ -45,7 +45,7 @@ def _time_of(name: str, *, most: bool) -> Ours:
 
 
 def _way_of_turn(share: float) -> float:
-    """Return how far the path comes back from its rightmost point in 4 s [m]."""
+    """Return the distance that the path comes back from its rightmost point in 4 s [m]."""
     Y = _history(share, 'Y_right_m')
     return float(Y.max() - Y[-1])
 
@@ -78,7 +78,7 @@ def _rms_of_speed_later(share: float) -> float:
 
 
 def _linear_apart(low: float, high: float) -> Ours:
-    """Return how far the linear path goes from the table's at most between two times [m]."""
+    """Return the largest distance of the linear path from that of the table in a time span [m]."""
 
     def distance(share: float) -> float:
         data = fig05()
