@@ -1,4 +1,4 @@
-"""The Foxglove layout shows topics that exist, and a flight fits into its views."""
+"""The Foxglove layout shows existing topics, and a flight fits into its views."""
 
 from collections.abc import Iterator
 import json
@@ -26,8 +26,11 @@ LAYOUT = json.loads((ROOT / 'config/foxglove_layout.json').read_text(encoding='u
 PANELS = LAYOUT['configById']
 PAGE = (ROOT / 'docs/foxglove.md').read_text(encoding='utf-8')
 FIELD, CLOSE = PANELS['3D!field'], PANELS['3D!disc']
-WIDEST, NARROWEST = 4.5, 2.6  # width by height of the field, without and with an open side bar
-CLOSE_UP = 0.7  # of the close-up, with an open side bar
+WIDEST, NARROWEST = (
+    4.5,
+    2.6,
+)  # width / height of the field, without and with a side bar
+CLOSE_UP = 0.7  # width / height of the close-up, with a side bar
 NUMBER = {'double', 'float', 'int32', 'uint32', 'int64'}
 MODIFIERS = {'.@rad2deg': 180.0 / math.pi}
 
@@ -60,23 +63,23 @@ def test_every_panel_is_placed_once():
     assert LAYOUT['globalVariables'] == LAYOUT['userNodes'] == {}
 
 
-def test_every_panel_has_a_title_that_the_page_explains():
+def test_the_page_explains_the_title_of_every_panel():
     for panel in PANELS.values():
         title, _, _ = panel['foxglovePanelTitle'].partition(' [')
         assert title.partition(',')[0].lower() in PAGE.lower()
 
 
-def test_colours_are_colours():
-    found = re.findall(r'"(#[^"]*)"', json.dumps(PANELS))
-    assert len(found) > 8
-    assert [c for c in found if not re.fullmatch('#([0-9a-fA-F]{2}){3,4}', c)] == []
+def test_colours_are_valid():
+    colours = re.findall(r'"(#[^"]*)"', json.dumps(PANELS))
+    assert len(colours) > 8
+    assert [c for c in colours if not re.fullmatch('#([0-9a-fA-F]{2}){3,4}', c)] == []
 
 
 # ---- topics and fields ----
 
 
-class Kinds:
-    """Topics without a network; keeps their types."""
+class TypesOfTopics:
+    """A factory of sinks that keeps the types of the topics: no network is needed."""
 
     node_name = 'sim_node'
 
@@ -90,9 +93,9 @@ class Kinds:
 
 @pytest.fixture(scope='module')
 def kinds() -> dict[str, type]:
-    found = Kinds()
-    Publishers(found, Frames(), with_clock=True)
-    return found.of
+    types = TypesOfTopics()
+    Publishers(types, Frames(), with_clock=True)
+    return types.of
 
 
 def paths() -> list[str]:
@@ -101,13 +104,13 @@ def paths() -> list[str]:
 
 
 def slots(kind: type, names: list[str]) -> str:
-    """Return the type of a field of a field of a message type."""
+    """Return the type of a nested field of a message type."""
     for name in names[:-1]:
         kind = type(getattr(kind(), name))
     return kind.get_fields_and_field_types()[names[-1]]
 
 
-def test_plots_and_gauges_show_numbers_of_topics_that_exist(kinds):
+def test_plots_and_gauges_show_numbers_of_existing_topics(kinds):
     for path in paths():
         plain, modifier, _ = path.partition('.@')
         assert not modifier or path[len(plain) :] in MODIFIERS
@@ -115,7 +118,7 @@ def test_plots_and_gauges_show_numbers_of_topics_that_exist(kinds):
         assert slots(kinds[topic], names) in NUMBER
 
 
-def test_plots_show_what_a_flight_is_judged_by():
+def test_plots_show_height_airspeed_angle_of_attack_and_spin():
     shown = {path.partition('.')[0].lstrip('/') for path in paths()}
     assert shown == {topics.POSE, topics.AIRSPEED, topics.ANGLE_OF_ATTACK, topics.SPIN_RATE}
 
@@ -131,20 +134,20 @@ def test_plots_show_the_whole_bag_on_one_time_axis():
 
 @pytest.fixture(scope='module')
 def flight():
-    """The flight of Fig. 5, with a sample at each message."""
+    """Return the flight of Fig. 5, with a sample at each message."""
     config = configuration({})
     return fly(config.launch, config.setup, sample_rate=config.publish_rate)
 
 
-def test_gauges_reach_as_far_as_the_flight(flight):
-    seen = flight.trajectory
-    values = {'/airspeed.data': seen.airspeed, '/angle_of_attack.data': seen.alpha}
+def test_gauges_cover_the_values_of_the_flight(flight):
+    t = flight.trajectory
+    values_of = {'/airspeed.data': t.airspeed, '/angle_of_attack.data': t.alpha}
     for gauge in of_kind('Gauge').values():
-        found = values[gauge['path']]
+        values = values_of[gauge['path']]
         assert gauge['minValue'] < gauge['maxValue']
-        assert gauge['minValue'] <= found.min()
-        assert found.max() <= gauge['maxValue']
-        assert np.ptp(found) > 0.1 * (gauge['maxValue'] - gauge['minValue'])  # the needle moves
+        assert gauge['minValue'] <= values.min()
+        assert values.max() <= gauge['maxValue']
+        assert np.ptp(values) > 0.1 * (gauge['maxValue'] - gauge['minValue'])  # the needle moves
 
 
 # ---- views ----
@@ -154,7 +157,7 @@ def visible(panel: dict) -> set[str]:
     return {topic for topic, settings in panel['topics'].items() if settings['visible']}
 
 
-def test_views_draw_what_they_are_for(kinds):
+def test_views_show_their_topics(kinds):
     assert visible(FIELD) == {f'/{topics.FIELD_MARKERS}', f'/{topics.PATH}'}
     assert visible(CLOSE) == {f'/{topics.MARKERS}'}
     for panel in of_kind('3D').values():
@@ -164,7 +167,7 @@ def test_views_draw_what_they_are_for(kinds):
         assert set(panel['transforms']) == frames
 
 
-def test_views_follow_frames_that_exist():
+def test_views_follow_existing_frames():
     frames = Frames()
     assert (FIELD['followTf'], CLOSE['followTf']) == (frames.map, frames.disc)
     for panel in of_kind('3D').values():
@@ -183,32 +186,34 @@ def on_screen(panel: dict, points: np.ndarray, aspect: float) -> np.ndarray:
     right = np.array([math.cos(theta), -math.sin(theta), 0.0])
     level = np.array([-math.sin(theta), -math.cos(theta), 0.0])
     back = math.sin(phi) * level + math.cos(phi) * np.array([0.0, 0.0, 1.0])
-    seen = points - (np.array(camera['targetOffset']) + camera['distance'] * back)
-    depth = -seen @ back
+    relative = points - (np.array(camera['targetOffset']) + camera['distance'] * back)
+    depth = -relative @ back
     assert depth.min() > camera['near']
     assert depth.max() < camera['far']
     half = depth * math.tan(0.5 * math.radians(camera['fovy']))
-    return np.stack((seen @ right / (half * aspect), seen @ np.cross(back, right) / half), axis=1)
+    return np.stack(
+        (relative @ right / (half * aspect), relative @ np.cross(back, right) / half), axis=1
+    )
 
 
 @pytest.mark.parametrize('aspect', [WIDEST, NARROWEST])
 def test_the_field_shows_the_flight_from_release_to_landing(flight, aspect):
     t = flight.trajectory
     flown = np.vstack((paper_frames.map_from_paper(t.position), flight.position))
-    seen = on_screen(FIELD, flown, aspect)
-    assert np.abs(seen).max() < 0.95
-    assert np.ptp(seen[:, 0]) > 0.8  # over 2: it does not fly in a corner
-    assert (np.diff(seen[:, 0]) > 0).all()  # to the right
+    screen = on_screen(FIELD, flown, aspect)
+    assert np.abs(screen).max() < 0.95
+    assert np.ptp(screen[:, 0]) > 0.8  # of 2: the flight is not in a corner
+    assert (np.diff(screen[:, 0]) > 0).all()  # to the right
 
 
 @pytest.mark.parametrize('aspect', [1.0, CLOSE_UP])
-def test_the_close_up_is_filled_by_the_disc(aspect):
+def test_the_disc_fills_the_close_up(aspect):
     turn = np.linspace(0.0, 2 * math.pi, 100)
     radius = 0.5 * configuration({}).setup.disc.diameter
     rim = radius * np.stack((np.cos(turn), np.sin(turn), 0.0 * turn), axis=1)
-    seen = on_screen(CLOSE, rim, aspect)
-    assert np.abs(seen).max() < 1.0
-    assert np.ptp(seen[:, 0]) > 1.0  # half the width
+    screen = on_screen(CLOSE, rim, aspect)
+    assert np.abs(screen).max() < 1.0
+    assert np.ptp(screen[:, 0]) > 1.0  # half the width
 
 
 # ---- page ----

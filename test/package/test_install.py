@@ -1,6 +1,5 @@
 """pip and colcon install the same executables and share files from a copy of the sources."""
 
-import ast
 from fnmatch import fnmatch
 from importlib.util import find_spec
 import json
@@ -15,10 +14,10 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
+from package.sources import PACKAGE, ROOT, executables
+
 pytestmark = pytest.mark.xdist_group('install')
 
-ROOT = Path(__file__).parents[2]
-PACKAGE = 'disc_sim_ros'
 USE_ROS = {'sim_node', 'recorder_node', 'demo'}  # the only executables that may import rclpy
 SHARED = ('config', 'launch', 'urdf', 'rviz')
 
@@ -45,14 +44,6 @@ def run(*command, cwd: Path, code: int = 0, **more: str) -> str:
     output = f'{done.stdout}\n{done.stderr}'
     assert done.returncode == code, f'{command} ended with {done.returncode}:\n{output}'
     return done.stdout
-
-
-def executables() -> dict[str, str]:
-    """Return the table EXECUTABLES of setup.py, read without running the file."""
-    for node in ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8')).body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'EXECUTABLES':
-            return ast.literal_eval(node.value)
-    raise AssertionError('setup.py has no table EXECUTABLES')
 
 
 def source_files() -> list[Path]:
