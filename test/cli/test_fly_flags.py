@@ -1,4 +1,4 @@
-"""`fly`: what each flag does to the flight."""
+"""`fly`: the effect of each flag on the flight."""
 
 from collections.abc import Callable
 import json
@@ -15,7 +15,7 @@ from disc_sim_ros.physics import flight
 pytestmark = pytest.mark.usefixtures('compiled')
 
 
-def test_air_that_is_not_there_leaves_a_parabola(document):
+def test_without_air_the_flight_is_a_parabola(document):
     found = document('--air-density', 0, '--gravity', 5, '--speed', 12, '--pitch', 30)
     sine, cosine = 0.5, math.sqrt(0.75)
     assert found['flight_time_s'] == pytest.approx(2 * 12 * sine / 5, abs=ROUNDING)
@@ -31,8 +31,8 @@ def test_yaw_turns_the_whole_flight_to_the_right(document):
     assert turned['drift_m'] == pytest.approx(straight['drift_m'], abs=ROUNDING)
 
 
-def test_the_other_spin_and_roll_fly_the_mirrored_flight(document):
-    """Roll, yaw, sideslip and spin change sign in a mirror, and so do y and the roll rate."""
+def test_the_mirrored_throw_flies_the_mirrored_flight(document):
+    """In a mirror, roll, yaw, sideslip, spin, y and the roll rate change sign."""
     sides = [
         document(
             '--roll', 10 * s, '--yaw', 5 * s, '--sideslip', 3 * s, '--spin', 40 * s,
@@ -48,12 +48,12 @@ def test_the_other_spin_and_roll_fly_the_mirrored_flight(document):
 
 
 def at(key: str, t: float) -> Callable[[dict], float]:
-    """The sample of a quantity at a time; samples are 10 a second."""
+    """Return a function that reads a quantity at a time; there are 10 samples a second."""
     return lambda found: found[key][round(10 * t)]
 
 
 def side(t: float) -> Callable[[dict], float]:
-    """How far left the disc is at a time."""
+    """Return a function that reads how far left the disc is at a time."""
     return lambda found: found['position_m'][round(10 * t)][1]
 
 
@@ -91,7 +91,7 @@ def key(name: str) -> Callable[[dict], float]:
         pytest.param(('--spin', 31.416), key('range_m'), 0, id='the default spin is the default'),
     ],
 )
-def test_flags_change_the_flight_as_they_should(document, arguments, quantity, sign):
+def test_each_flag_changes_the_flight_in_the_right_direction(document, arguments, quantity, sign):
     changed, default = document('--samples', 10, *arguments), document('--samples', 10)
     assert np.sign(round(quantity(changed) - quantity(default), 9)) == sign
 
@@ -104,7 +104,7 @@ def test_a_moment_that_lifts_the_nose_rolls_an_anticlockwise_disc_right(document
 
 
 def test_rates_at_release_start_the_disc_turning(document):
-    """p turns the roll, q the pitch, in the first millisecond before the spin mixes them."""
+    """In the first millisecond p changes the roll and q the pitch; later the spin mixes them."""
     for flag, key_, other in (
         ('--roll-rate', 'roll_deg', 'pitch_deg'),
         ('--pitch-rate', 'pitch_deg', 'roll_deg'),
@@ -117,7 +117,7 @@ def test_rates_at_release_start_the_disc_turning(document):
         assert abs(turned[other]) < 2 * math.degrees(63e-6)
 
 
-def test_the_spin_decays_but_where_the_model_keeps_it(document):
+def test_the_spin_decays_except_in_the_models_that_keep_it(document):
     ends = {m: document('--model', m)['end_spin_rad_s'] for m in flight.MODELS}
     assert 0.95 * 31.416 < ends['exact'] < 31.416
     assert ends['constant_spin'] == ends['precession'] == 31.416
@@ -129,7 +129,7 @@ def test_the_models_agree_roughly_and_differ(document):
     assert max(ranges) - min(ranges) < 0.5  # m; the paper's Fig. 9: they are hard to tell apart
 
 
-def test_straight_lines_are_those_of_the_disc_with_straight_lines(document):
+def test_aero_linear_flies_as_the_linear_disc(document):
     lines, disc = document('--aero', 'linear'), document('--disc', 'frisbee_linear')
     assert lines['landing_position_m'] == disc['landing_position_m']
     assert lines['landing_position_m'] != document()['landing_position_m']
@@ -145,14 +145,14 @@ def test_straight_lines_are_those_of_the_disc_with_straight_lines(document):
         ('--turbulence', 5),
     ],
 )
-def test_what_flies_matters(document, arguments):
+def test_each_choice_of_disc_axes_and_gusts_moves_the_landing(document, arguments):
     moved = np.subtract(
         document(*arguments)['landing_position_m'], document()['landing_position_m']
     )
-    assert np.linalg.norm(moved) > 1e-3  # m; a flag that is ignored moves nothing
+    assert np.linalg.norm(moved) > 1e-3  # m; an ignored flag would not move it
 
 
-def test_a_longer_step_is_another_flight_but_not_by_much(document):
+def test_a_longer_step_moves_the_landing_slightly(document):
     moved = np.subtract(
         document('--step', 4e-3)['landing_position_m'], document()['landing_position_m']
     )
@@ -167,12 +167,12 @@ def test_gusts_depend_on_their_seed_alone(document):
     assert document('--seed', 1)['range_m'] == document('--seed', 2)['range_m']
 
 
-def test_the_largest_seed_is_taken(document):
+def test_the_largest_seed_is_accepted(document):
     assert document('--turbulence', 1, '--seed', 2**63 - 1)['landed']
 
 
 @pytest.mark.parametrize('ratio', [0.5, -0.25, 0.0])
-def test_the_advance_ratio_is_a_spin(document, ratio):
+def test_the_advance_ratio_gives_the_spin(document, ratio):
     found = document('--advance-ratio', ratio, '--speed', 12)
     spin = 2 * 12 * ratio / DIAMETER  # eqn 63
     assert found['launch']['spin_rad_s'] == pytest.approx(spin, rel=1e-15)
@@ -185,7 +185,7 @@ def test_the_advance_ratio_takes_the_diameter_of_the_disc(document):
     assert found['launch']['spin_rad_s'] == pytest.approx(2 * 15 * 0.5 / 0.211, rel=1e-15)
 
 
-def test_no_speed_takes_no_advance_ratio_but_zero(document):
+def test_at_speed_0_only_the_advance_ratio_0_is_accepted(document):
     assert document('--speed', 0, '--advance-ratio', 0)['launch']['spin_rad_s'] == 0.0
 
 
@@ -193,7 +193,7 @@ def test_a_users_disc_flies(document, tmp_path):
     path = tmp_path / 'my disc.yaml'
     path.write_text('based_on: frisbee\nmass_kg: 1.75e-1\n', encoding='utf-8')
     found = document('--disc', path)
-    assert found['launch'].pop('disc') == str(path)  # which finds it again
+    assert found['launch'].pop('disc') == str(path)  # so that it can be flown again
     default = document()
     default['launch'].pop('disc')
     assert found == default
@@ -203,7 +203,7 @@ def test_a_users_disc_flies(document, tmp_path):
     ('text', 'value'),
     [('-1e-3', -1e-3), ('-.5', -0.5), ('-1.', -1.0), ('-2E+0', -2.0), ('-0', 0.0), ('+1', 1.0)],
 )
-def test_negative_numbers_are_no_flags(document, text, value):
+def test_negative_numbers_are_not_read_as_flags(document, text, value):
     launch = document('--control', text, text, text, '--wind', text, text, text)['launch']
     assert launch['control'] == [value] * 3
     assert launch['wind_m_s'] == [value] * 3
@@ -211,7 +211,7 @@ def test_negative_numbers_are_no_flags(document, text, value):
     assert document(f'--roll={text}')['launch']['roll_deg'] == value
 
 
-def test_rates_that_the_precession_model_sets_itself_are_noted(fly):
+def test_a_note_says_that_the_precession_model_ignores_the_rates_at_release(fly):
     result = fly('--model', 'precession', '--roll-rate', 1, '--json')
     assert result.code == 0
     assert re.fullmatch(r'fly: note: --roll-rate [^\n]+\n', result.err)

@@ -1,4 +1,4 @@
-"""`fly`: what it refuses, in one line that names the flag and what is allowed."""
+"""`fly` refuses bad input in one line that names the flag and what is allowed."""
 
 import json
 import re
@@ -30,7 +30,7 @@ NUMBERS = {
     '--air-density': (-1, 101, '0 to 100 kg/m^3'),
     '--gravity': (-1, 101, '0 to 100 m/s^2'),
 }
-# What is given and how it is shown.
+# The given text, and how the message shows it.
 NO_NUMBERS = {
     'nan': 'nan',
     '-nan': 'nan',
@@ -60,7 +60,7 @@ def test_numbers_out_of_range_are_refused(fly, flag):
 
 @pytest.mark.parametrize('text', NO_NUMBERS)
 @pytest.mark.parametrize('flag', NUMBERS)
-def test_what_is_no_number_is_refused(fly, flag, text):
+def test_text_that_is_not_a_number_is_refused(fly, flag, text):
     refused(fly(flag, text), f'{flag}: {NO_NUMBERS[text]} ', NUMBERS[flag][2])
 
 
@@ -76,7 +76,7 @@ def test_a_missing_number_is_refused(fly, flag):
 )
 @pytest.mark.parametrize('text', [*NO_NUMBERS, '101', '-101'])
 @pytest.mark.parametrize('place', [0, 1, 2])
-def test_three_numbers_are_each_checked(fly, flag, allowed, text, place):
+def test_each_of_three_numbers_is_checked(fly, flag, allowed, text, place):
     values = ['0', '-1e-3', '0.5']
     values[place] = text
     refused(fly(flag, *values), f'{flag}: {NO_NUMBERS.get(text, text)} ', allowed)
@@ -86,7 +86,7 @@ def test_three_numbers_are_each_checked(fly, flag, allowed, text, place):
     ('flag', 'allowed'), [('--control', '-10 to 10'), ('--wind', '-100 to 100 m/s')]
 )
 @pytest.mark.parametrize('values', [(), ('1',), ('1', '-1e-3')])
-def test_three_numbers_must_be_three(fly, flag, allowed, values):
+def test_fewer_than_three_numbers_are_refused(fly, flag, allowed, values):
     refused(fly(flag, *values), f'{flag}: expected 3 arguments', allowed)
 
 
@@ -165,7 +165,7 @@ def test_a_bad_disc_file_is_refused_in_one_line(fly, tmp_path):
     refused(fly('--disc', path), 'mine.yaml', "'mas_kg'", 'did you mean mass_kg?')
 
 
-def test_what_is_refused_is_refused_before_the_compiler_speaks(fly, monkeypatch):
+def test_bad_input_is_refused_before_the_note_about_compilation(fly, monkeypatch):
     monkeypatch.setattr(jit, 'is_compiled', lambda _: False)
     refused(fly('--height', -1), '--height')
     refused(fly('--step', 0.1, '--spin', 500), '--step')
@@ -173,14 +173,14 @@ def test_what_is_refused_is_refused_before_the_compiler_speaks(fly, monkeypatch)
     refused(fly('--model', 'precession', '--roll-rate', 1, '--height', -1), '--height')
 
 
-def test_the_compiler_speaks_on_stderr(fly, monkeypatch):
+def test_the_note_about_compilation_goes_to_stderr(fly, monkeypatch):
     monkeypatch.setattr(jit, 'is_compiled', lambda _: False)
     result = fly('--json')
     assert json.loads(result.out)['landed']
     assert re.fullmatch(r'fly: note: compiling [^\n]+\n', result.err)
 
 
-def test_a_flight_that_leaves_the_numbers_ends_with_code_1(fly):
+def test_a_flight_that_the_step_cannot_follow_ends_with_code_1(fly):
     result = fly('--speed', 200, '--control', 10, 10, 10, '--air-density', 2)
     assert (result.code, result.out) == (1, '')
     assert re.fullmatch(r'fly: error: [^\n]*shorter step[^\n]*\n', result.err)

@@ -1,4 +1,4 @@
-"""The examples, started as their first lines say, against a simulator in its own process."""
+"""The examples, started as their first lines state, with a simulator in its own process."""
 
 from dataclasses import replace
 import importlib.util
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.ros
 EXAMPLES = Path(__file__).parents[2] / 'examples'
 FRISBEE = Setup(disc=disc_file.load_disc('frisbee'))
 WAITING = {'auto_throw': False, 'real_time_factor': 4.0}
-DEADLINE = 180.0  # s for what takes 20 on an idle machine
+DEADLINE = 180.0  # s; an idle machine needs 20
 
 
 def start(name: str, *arguments: str) -> subprocess.Popen:
@@ -77,7 +77,7 @@ def landings(events: list[DiagnosticStatus]) -> list[DiagnosticStatus]:
 
 
 @pytest.mark.parametrize('namespace', ['', '/red'])
-def test_throw_throws_what_the_core_flies(ros, namespace):
+def test_throw_flies_as_the_physics_computes(ros, namespace):
     ros.start(WAITING, namespace=namespace)
     events = ros.subscribe(DiagnosticStatus, f'{namespace}/{topics.FLIGHT_EVENTS}')
     odometry = ros.subscribe(Odometry, f'{namespace}/{topics.ODOM}')
@@ -97,7 +97,7 @@ def test_throw_throws_what_the_core_flies(ros, namespace):
     assert found['landing_y_m'] == pytest.approx(flight.position[1], abs=1e-9)
 
 
-def test_throw_takes_a_disc_out_of_the_air_and_follows_its_own(ros):
+def test_throw_replaces_a_flying_disc_and_reports_its_own_flight(ros):
     ros.start({'real_time_factor': 4.0, 'launch.speed': 30.0, 'launch.height': 1000.0})
     output = run('throw.py', '--speed', '15')
     assert output.splitlines() == [
@@ -106,14 +106,14 @@ def test_throw_takes_a_disc_out_of_the_air_and_follows_its_own(ros):
     ]
 
 
-def test_throw_says_that_there_is_no_simulator(load, capsys):
+def test_throw_reports_that_there_is_no_simulator(load, capsys):
     module = load('throw.py')
     module.PATIENCE = 0.5
     assert module.main([]) == 1
     assert 'no simulator' in capsys.readouterr().err
 
 
-def test_throw_says_that_the_simulator_refused(ros, load, capsys):
+def test_throw_reports_that_the_simulator_refused(ros, load, capsys):
     sim = ros.start(WAITING)
     module = load('throw.py')
     module.TO_THROW = 3.0
@@ -138,7 +138,7 @@ def test_throw_can_be_interrupted(ros):
     assert (process.returncode, errors) == (1, '')
 
 
-def test_steer_turns_the_flight_as_the_core_says(ros):
+def test_steer_turns_the_flight_as_the_physics_computes(ros):
     ros.start(WAITING)
     output = run('steer.py', '--command', '0.001', '0.005', '0.002')
     ends = [
@@ -151,7 +151,7 @@ def test_steer_turns_the_flight_as_the_core_says(ros):
     assert abs(ends[1][1] - ends[0][1]) > 1.0
 
 
-def test_steer_says_that_there_is_no_simulator(load, capsys):
+def test_steer_reports_that_there_is_no_simulator(load, capsys):
     module = load('steer.py')
     module.PATIENCE = 0.5
     assert module.main([]) == 1
@@ -159,7 +159,7 @@ def test_steer_says_that_there_is_no_simulator(load, capsys):
 
 
 @pytest.mark.parametrize('name', ['throw.py', 'steer.py'])
-def test_help_tells_units_and_a_wrong_flag_ends_with_2(name, ros_environment):
+def test_help_is_printed_and_a_wrong_flag_ends_with_2(name, ros_environment):
     assert 'usage' in run(name, '--help')
     process = start(name, '--sped', '3')
     _, errors = process.communicate(timeout=DEADLINE)
@@ -171,9 +171,7 @@ def test_help_tells_units_and_a_wrong_flag_ends_with_2(name, ros_environment):
 @pytest.mark.parametrize(
     ('launch', 'target'), [(Launch(roll=10.0), (26.0, 0.0)), (Launch(), (22.0, 5.0))]
 )
-def test_the_pilot_lands_a_disc_at_a_target_in_wind_that_it_does_not_know(
-    load, launch, target, wind_y
-):
+def test_the_pilot_lands_a_disc_at_a_target_in_unknown_wind(load, launch, target, wind_y):
     pilot = load('steer_to_target.py').Pilot(FRISBEE.disc, np.array(target) * (1.0, -1.0))
     air = replace(FRISBEE, wind=Wind(mean=(0.0, -wind_y, 0.0)))
     assert math.dist(fly(launch, air).position[:2], target) > 5.0

@@ -1,4 +1,4 @@
-"""Files of discs: those of the package and those of measurements, and what discs they make."""
+"""Helpers for the tests of disc files: files of the package and of measurements."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -28,7 +28,7 @@ def yaml_of(name: str) -> str:
 
 
 def published(name: str) -> tuple[list[str], np.ndarray]:
-    """The header and the rows of a file of measurements."""
+    """Return the header and the rows of a file of measurements."""
     text = (DATA / name).read_text(encoding='utf-8')
     head, *rows = [line.split(',') for line in text.splitlines() if not line.startswith('#')]
     return head, np.array(rows, dtype=float)
@@ -39,7 +39,7 @@ def end_of(disc: Disc) -> tuple[float, ...]:
 
 
 def assert_same_disc(a: Disc, b: Disc, *, but: tuple[str, ...] = ()) -> None:
-    """Every number of two discs is the same; names and descriptions may differ."""
+    """Assert that every number of two discs is the same; names and descriptions may differ."""
     for field in vars(a).keys() - {'name', 'description', *but}:
         mine, other = getattr(a, field), getattr(b, field)
         if hasattr(mine, '__slots__') and field != 'linear':

@@ -1,4 +1,4 @@
-"""The disc catalogue holds the published numbers; a user has files of their own."""
+"""Disc files: the catalogue holds the published numbers, and users can write their own."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ def test_every_disc_flies(name):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_every_disc_says_what_it_is(name):
+def test_every_disc_has_a_description(name):
     disc = disc_file.load_disc(name)
     assert disc.name == name
     assert len(disc.description) > 10
@@ -106,7 +106,7 @@ def test_the_straight_lines_of_fig_3():
     assert (line.alpha_0, line.CM_0, line.CM_alpha) == (-0.052, -0.01, 0.057)
 
 
-def test_the_frisbee_table_is_the_measured_one():
+def test_the_frisbee_table_holds_the_measured_coefficients():
     head, rows = published('wind_tunnel_crowther_potts.csv')
     table = disc_file.load_disc('frisbee').table
     assert table is not None
@@ -115,7 +115,7 @@ def test_the_frisbee_table_is_the_measured_one():
     assert_array_equal(table.coefficients, rows[:, 1:])
 
 
-def test_the_wraith_table_is_the_measured_one_where_it_was_measured():
+def test_the_wraith_table_holds_the_measured_coefficients_in_the_measured_range():
     _, rows = published('wind_tunnel_wraith_kamaruddin2018.csv')
     table = disc_file.load_disc('wraith').table
     assert table is not None
@@ -124,8 +124,8 @@ def test_the_wraith_table_is_the_measured_one_where_it_was_measured():
     assert_array_equal(table.coefficients[measured], rows[:, 1:])
 
 
-def test_the_wraith_table_is_filled_as_its_file_says():
-    """The Frisbee's rows plus the mismatch at the edge, which fades to nothing at 90 degrees."""
+def test_the_wraith_table_outside_the_measured_range_is_as_its_file_states():
+    """The rows of the Frisbee plus the mismatch at the edge, which falls to 0 at 90 degrees."""
     _, measured = published('wind_tunnel_wraith_kamaruddin2018.csv')
     _, frisbee = published('wind_tunnel_crowther_potts.csv')
     frisbee_row = {row[0]: row[1:] for row in frisbee}
@@ -144,7 +144,7 @@ def test_the_wraith_table_is_filled_as_its_file_says():
     assert_allclose(found, expected, rtol=0.0, atol=0.5001e-4)
 
 
-def test_the_spin_roll_moment_is_the_measured_one_but_for_what_its_file_says():
+def test_the_spin_roll_moment_is_measured_except_where_its_file_states_otherwise():
     head, rows = published('spin_roll_moment_hummel2003.csv')
     table = disc_file.load_disc('frisbee_roll_moment').spin_roll_moment
     assert table is not None
@@ -153,8 +153,8 @@ def test_the_spin_roll_moment_is_the_measured_one_but_for_what_its_file_says():
     assert_allclose(np.degrees(table.alpha), degrees, rtol=1e-15, atol=0.0)
     assert_array_equal(table.advance_ratio, rows[:, 0])
     assert_array_equal(table.coefficient[1:, 1:-1], rows[1:, 1:])
-    # What differs: no moment without spin, where up to 0.0020 were read but for the padded
-    # column, and none at +-90 degrees.
+    # The differences: no moment without spin, where up to 0.0020 were read except in the padded
+    # column, and no moment at +-90 degrees.
     assert_array_equal(table.coefficient[0], 0.0)
     assert np.abs(rows[0, 1:-1]).max() == 0.0020
     assert_array_equal(table.coefficient[:, [0, -1]], 0.0)
@@ -166,7 +166,7 @@ def test_the_spin_roll_moment_changes_nothing_else():
     assert frisbee.spin_roll_moment is None
 
 
-def test_low_damping_is_a_tenth_of_the_roll_and_pitch_damping_and_nothing_else():
+def test_low_damping_changes_only_roll_and_pitch_damping_to_a_tenth():
     disc, frisbee = disc_file.load_disc('frisbee_low_damping'), disc_file.load_disc('frisbee')
     assert disc.C_Lp == pytest.approx(0.1 * frisbee.C_Lp, rel=1e-15)
     assert disc.C_Mq == pytest.approx(0.1 * frisbee.C_Mq, rel=1e-15)
@@ -182,7 +182,7 @@ def test_the_ultrastar_has_the_coefficients_of_the_frisbee():
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_a_copy_of_a_disc_of_the_package_is_that_disc(user_file, name):
+def test_a_copy_of_a_disc_of_the_package_flies_the_same(user_file, name):
     own = disc_file.load_disc(user_file(yaml_of(name)))
     assert own.name == 'mine'
     assert_same_disc(own, disc_file.load_disc(name))
@@ -197,24 +197,26 @@ def test_a_copy_of_a_disc_of_the_package_is_that_disc(user_file, name):
         pytest.param(b'---\n' + yaml_of('frisbee').encode() + b'...\n', id='document marks'),
     ],
 )
-def test_any_editor_will_do(user_file, content):
+def test_files_of_any_editor_are_read(user_file, content):
     assert_same_disc(disc_file.load_disc(user_file(content)), disc_file.load_disc('frisbee'))
 
 
 @pytest.mark.parametrize('file_name', ['mine.yml', 'my disc.yaml', 'Schüssel.yaml', 'a.b.yaml'])
-def test_any_name_of_a_file_will_do(user_file, file_name):
+def test_any_file_name_is_accepted(user_file, file_name):
     disc = disc_file.load_disc(user_file(yaml_of('frisbee'), file_name))
     assert disc.name == Path(file_name).stem
 
 
-def test_a_file_of_the_name_of_a_disc_of_the_package_is_the_file(user_file, monkeypatch, tmp_path):
+def test_a_file_with_the_name_of_a_disc_of_the_package_takes_precedence(
+    user_file, monkeypatch, tmp_path
+):
     user_file('based_on: frisbee\nmass_kg: 0.2\n', 'frisbee.yaml')
     monkeypatch.chdir(tmp_path)
     assert disc_file.load_disc('frisbee.yaml').mass == 0.2
     assert disc_file.load_disc('frisbee').mass == 0.175
 
 
-def test_based_on_changes_only_what_is_given(user_file):
+def test_based_on_changes_only_the_given_keys(user_file):
     disc = disc_file.load_disc(user_file('based_on: wraith\nmass_kg: 0.15\n'))
     assert disc.mass == 0.15
     assert_same_disc(disc, disc_file.load_disc('wraith'), but=('mass',))
@@ -241,7 +243,7 @@ def test_based_on_goes_through_several_files(user_file):
 
 
 def test_loading_twice_gives_two_discs_that_do_not_share(user_file):
-    """What a file changes must not leak into the disc that it is based on."""
+    """A change in a file must not affect the disc that it is based on."""
     disc_file.load_disc(user_file('based_on: frisbee\ndamping: {C_Mq: -2}\n'))
     assert disc_file.load_disc('frisbee').C_Mq == -1.40
 
@@ -259,7 +261,7 @@ def test_loading_twice_gives_two_discs_that_do_not_share(user_file):
         ('1e300', 1e300),
     ],
 )
-def test_numbers_mean_what_they_look_like(user_file, text, value):
+def test_numbers_are_read_as_decimal(user_file, text, value):
     assert disc_file.load_disc(user_file(f'based_on: frisbee\nmass_kg: {text}\n')).mass == value
 
 

@@ -1,4 +1,4 @@
-"""What describes no disc is refused in one line: file, key, value and what is allowed."""
+"""A bad disc file is refused in one line that names file, key, value and what is allowed."""
 
 import os
 from pathlib import Path
@@ -49,7 +49,7 @@ def mass(value: str) -> str:
 
 
 def nested(levels: int, per_level: int, first: str, level: str) -> str:
-    """Anchors that hold aliases that hold aliases: a few lines that mean very many values."""
+    """Return anchors with aliases of anchors: a few lines that expand to very many values."""
     lines = [f'a0: &a0 {first}']
     for i in range(1, levels):
         aliases = ', '.join([f'*a{i - 1}'] * per_level)
@@ -269,7 +269,7 @@ REFUSED = {
     'Latin-1': ('description: Schüssel\n'.encode('latin-1'), ['not UTF-8 text']),
     'UTF-16': (FRISBEE.encode('utf-16'), ['not UTF-8 text']),
     'large file': (FRISBEE + '#' * 200_000, ['at most 131072 bytes']),
-    # files that are made to hurt
+    # malicious files
     'aliases of aliases': (nested(30, 9, '[lol]', '[{}]'), ["'a0'", 'unknown key']),
     'merges of merges': (nested(30, 9, '{k: 1}', '{{<<: [{}]}}'), ['line 2', '<<']),
     'list that holds itself': (mass('&a [*a]'), ['mass_kg', 'number > 0']),
@@ -284,7 +284,7 @@ REFUSED = {
 
 
 def refusal(name: str) -> str:
-    """The message with which a disc is refused; it is one short line, safe on a terminal."""
+    """Return the message of the refusal, after checks that it is short and safe on a terminal."""
     with pytest.raises(ConfigError) as error:
         disc_file.load_disc(name)
     message = str(error.value)
@@ -293,7 +293,7 @@ def refusal(name: str) -> str:
     return message
 
 
-@pytest.mark.timeout(60)  # each takes well below 1 s, or without end
+@pytest.mark.timeout(60)  # each takes well below 1 s, or never ends
 @pytest.mark.parametrize(('content', 'fragments'), REFUSED.values(), ids=REFUSED)
 def test_a_bad_file_is_refused_with_file_key_value_and_what_is_allowed(
     user_file, content, fragments
@@ -342,7 +342,7 @@ def test_every_column_is_checked(user_file, column, value):
         ('x' * 100_000, ['xxx', 'frisbee']),
     ],
 )
-def test_a_disc_that_is_not_there_is_refused(name, fragments):
+def test_a_missing_disc_is_refused(name, fragments):
     message = refusal(name)
     for fragment in fragments:
         assert fragment in message
@@ -359,7 +359,7 @@ def test_a_pipe_is_refused(tmp_path):
     assert 'not a file' in refusal(str(tmp_path / 'mine.yaml'))
 
 
-@pytest.mark.timeout(60)  # reading it would go on until the memory is full
+@pytest.mark.timeout(60)  # reading it would fill the memory
 def test_an_endless_device_is_refused(tmp_path):
     (tmp_path / 'mine.yaml').symlink_to('/dev/zero')
     assert 'not a file' in refusal(str(tmp_path / 'mine.yaml'))
@@ -375,14 +375,14 @@ def test_an_unreadable_file_is_refused(user_file):
     assert 'Permission denied' in message
 
 
-def test_a_bad_file_of_a_long_and_odd_name_is_refused_in_one_line(tmp_path):
+def test_a_bad_file_with_a_long_and_odd_name_is_refused_in_one_line(tmp_path):
     folder = tmp_path / ('x' * 200) / 'new\nline\x1b[2J'
     folder.mkdir(parents=True)
     (folder / 'mine.yaml').write_text(mass('-1'), encoding='utf-8')
     assert r'new\nline\x1b[2J/mine.yaml: mass_kg: -1' in refusal(str(folder / 'mine.yaml'))
 
 
-def test_a_file_name_that_is_no_text_gives_a_name_that_is(tmp_path):
+def test_a_file_name_with_undecodable_bytes_gives_a_printable_name(tmp_path):
     path = tmp_path / os.fsdecode(b'disc\xff.yaml')
     path.write_text(FRISBEE, encoding='utf-8')
     assert disc_file.load_disc(str(path)).name == 'disc?'

@@ -130,7 +130,7 @@ def test_any_number_comes_back_to_the_bit(setup, release, physics_rate, publish_
 @settings(deadline=None)
 @given(name=st.text(max_size=20).filter(str.isprintable))  # what a disc file may hold
 def test_any_name_comes_back(name):
-    description = f'on: {name}'.strip()  # as a disc file gives it
+    description = ' '.join(f'on: {name}'.split())  # as a disc file gives it
     recorded = config(Setup(disc=replace(FRISBEE, name=name, description=description)))
     disc = back(recorded).setup.disc
     assert (disc.name, disc.description) == (name, description)

@@ -1,4 +1,4 @@
-"""What the parameters are by default, and in files."""
+"""The parameters by default and in files, for the tests."""
 
 from pathlib import Path
 

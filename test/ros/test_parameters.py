@@ -1,4 +1,4 @@
-"""The parameters of sim_node: what they are and mean, and what is refused."""
+"""The parameters of sim_node: their table, their meaning and their refusals, without ROS."""
 
 import dataclasses
 import math
@@ -116,7 +116,7 @@ def test_defaults_are_the_throw_of_fig_5():
 
 
 def test_every_parameter_reaches_the_configuration():
-    """A changed value must change the configuration: none may be forgotten on the way."""
+    """A changed value must change the configuration: no parameter may be dropped."""
     words = {'disc': 'ultrastar', 'model': 'precession', 'moment_axes': 'wind', 'aero': 'linear'}
     words |= {'frame_prefix': 'red/', 'publish_rate': 100.0, 'physics_rate': 2000.0}
     for spec in TABLE:
@@ -139,11 +139,11 @@ def test_wind_turns_from_map_to_the_axes_of_the_paper():
     assert wind.mean == (1.0, -2.0, -3.0)
 
 
-def test_calm_has_no_minus_zeros():
+def test_zero_wind_has_no_minus_zeros():
     assert [math.copysign(1.0, x) for x in configuration({}).setup.wind.mean] == [1.0, 1.0, 1.0]
 
 
-def test_a_whole_number_is_a_double_where_one_is_due():
+def test_a_whole_number_is_converted_where_the_parameter_is_a_double():
     config = configuration({'physics_rate': 500, 'publish_rate': 100, 'imu.offset': [0, 0, 1]})
     assert (config.physics_rate, type(config.physics_rate)) == (500.0, float)
     assert config.imu.offset == (0.0, 0.0, 1.0)
@@ -152,8 +152,8 @@ def test_a_whole_number_is_a_double_where_one_is_due():
 
 @pytest.mark.parametrize('end', ['lowest', 'highest'])
 @pytest.mark.parametrize('spec', NUMBERS, ids=lambda spec: spec.name)
-def test_the_ends_of_a_range_are_in_it(spec, end):
-    """The core has ranges of its own, which must not be narrower."""
+def test_the_ends_of_a_range_are_allowed(spec, end):
+    """No check of the physics may be narrower than the range of the parameter."""
     value = getattr(spec, end)
     others = dict(LENIENT)
     if spec.name in {'physics_rate', 'publish_rate'} and value >= 10.0:
@@ -165,14 +165,14 @@ def test_the_ends_of_a_range_are_in_it(spec, end):
 
 @pytest.mark.parametrize('spec', NUMBERS, ids=lambda spec: spec.name)
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, '1', None, True, [1.0], 10**400])
-def test_a_number_is_finite_and_no_other_type(spec, value):
+def test_a_number_that_is_not_finite_or_of_another_type_is_refused(spec, value):
     with pytest.raises(ConfigError) as refused:
         configuration({spec.name: value})
     assert refused.value.thing == spec.name
 
 
 @pytest.mark.parametrize('spec', NUMBERS, ids=lambda spec: spec.name)
-def test_beyond_its_range_a_number_is_refused(spec):
+def test_a_number_out_of_its_range_is_refused(spec):
     step = 1 if isinstance(spec.default, int) else 1e-9 * max(1.0, spec.highest)
     for value in (spec.lowest - step, spec.highest + step):
         with pytest.raises(ConfigError, match='number from') as refused:
@@ -187,7 +187,7 @@ def test_beyond_its_range_a_number_is_refused(spec):
         ({'launch.height': -1.0}, 'launch.height', 'with ground, release at 0 m or above'),
         ({'physics_rate': 50.0, 'publish_rate': 50.0, 'launch.spin': -100.0}, 'physics_rate',
          '50 is not allowed; its step is 0.02 s, and at spin -100 rad/s .* at most 0.0139'),
-        ({'disc': 'wraith', 'aero': 'linear'}, 'aero', 'disc wraith holds no such coefficients'),
+        ({'disc': 'wraith', 'aero': 'linear'}, 'aero', 'disc wraith has no such coefficients'),
         ({'publish_rate': 300.0}, 'publish_rate', 'near are 250 and 333.333333333'),
         ({'publish_rate': 2000.0}, 'publish_rate', 'near are 1000$'),
         ({'physics_rate': 500.0}, 'publish_rate', 'physics_rate 500 Hz must be a whole multiple'),
@@ -218,7 +218,7 @@ def test_beyond_its_range_a_number_is_refused(spec):
         ({'qqq': 3}, 'qqq', 'there is no such parameter$'),
     ],
 )  # fmt: skip
-def test_refused_with_the_name_of_the_parameter_and_the_reason(values, thing, reason):
+def test_a_refusal_has_the_name_of_the_parameter_and_the_reason(values, thing, reason):
     with pytest.raises(ConfigError, match=reason) as refused:
         configuration(values)
     assert refused.value.thing == thing
@@ -233,7 +233,7 @@ def test_steps_per_publish_is_a_whole_number(steps):
         assert config.steps_per_publish == steps
 
 
-def test_the_rates_that_a_refusal_proposes_are_taken():
+def test_the_rates_that_a_refusal_proposes_are_allowed():
     for rate in ('250', '333.333333333'):
         configuration({'publish_rate': float(rate)})
 
@@ -246,7 +246,7 @@ def test_frame_prefix(prefix):
 @pytest.mark.parametrize(
     'prefix', ['/', '/a', 'a//', '1a', 'a b', 'a-b', 'aä', '_a', 'a\n', 'a/1']
 )
-def test_frame_prefix_that_is_no_name(prefix):
+def test_a_bad_frame_prefix_is_refused(prefix):
     with pytest.raises(ConfigError, match='frame_prefix'):
         configuration({'frame_prefix': prefix})
 

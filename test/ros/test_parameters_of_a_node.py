@@ -1,4 +1,4 @@
-"""The parameters of sim_node as ROS shows, takes and refuses them."""
+"""The parameters of sim_node in ROS: declared, described, changed and refused."""
 
 import math
 from pathlib import Path
@@ -98,7 +98,7 @@ def test_descriptions_show_range_unit_effect_and_choices(declared):
 
 
 @pytest.mark.ros
-def test_the_file_of_the_package_is_taken_whole(declared):
+def test_the_parameter_file_of_the_package_is_accepted(declared):
     node = declared('--params-file', str(ROOT / 'config/sim.yaml'), name='other', namespace='/a/b')
     assert parameters.values(node, TABLE) == DEFAULTS
     parameters.refuse_unused(node)
@@ -123,7 +123,7 @@ def test_values_come_from_file_command_line_and_constructor(declared, tmp_path):
 
 
 @pytest.mark.ros
-def test_an_integer_will_do_for_a_double(declared, tmp_path):
+def test_an_integer_is_accepted_for_a_double(declared, tmp_path):
     node = declared(
         *parameter_file(tmp_path, 'physics_rate: 2000\n    imu: {offset: [0, 0, 1]}'),
         '-p', 'launch.speed:=20',
@@ -192,7 +192,7 @@ def test_a_misspelt_name_is_refused_wherever_it_comes_from(ros_environment, tmp_
 
 
 @pytest.mark.ros
-def test_parameters_of_ros_itself_are_taken(declared, tmp_path):
+def test_parameters_of_ros_itself_are_accepted(declared, tmp_path):
     lines = (
         'use_sim_time: true\n    start_type_description_service: false\n'
         '    qos_overrides./chatter.publisher.depth: 7'
@@ -206,7 +206,7 @@ def test_parameters_of_ros_itself_are_taken(declared, tmp_path):
 
 
 @pytest.mark.ros
-def test_a_misspelt_quality_of_service_is_refused_in_the_end(declared):
+def test_a_misspelt_qos_override_is_refused_after_the_publishers_exist(declared):
     node = declared('-p', 'qos_overrides./chater.publisher.depth:=7')
     options = QoSOverridingOptions.with_default_policies()
     node.create_publisher(Empty, '/chatter', 10, qos_overriding_options=options)
@@ -228,7 +228,7 @@ def test_a_misspelt_quality_of_service_is_refused_in_the_end(declared):
             change(wind__x=3.0, publish_rate=300.0),
             'publish_rate: 300 is not allowed; physics_rate',
         ),
-        (change(wind__x=3.0, disc='wraith', aero='linear'), 'aero: .* disc wraith holds no such'),
+        (change(wind__x=3.0, disc='wraith', aero='linear'), 'aero: .* disc wraith has no such'),
         (change(wind__x=3.0, disc='frisby'), 'did you mean frisbee'),
         (change(wind__x=3.0, imu__offset=[0.0, math.inf, 0.0]), 'imu.offset: .* give 3 numbers'),
         (change(wind__x=3.0, imu__offset=[0.0]), 'imu.offset: .* give 3 numbers'),
@@ -253,7 +253,7 @@ def test_an_impossible_change_is_refused_as_a_whole(declared, changes, reason):
 
 
 @pytest.mark.ros
-def test_a_change_that_is_only_possible_together_is_taken(declared):
+def test_changes_that_are_only_valid_together_are_accepted(declared):
     node = declared()
     alone, _ = node.set_parameters(change(physics_rate=300.0, wind__x=1.0))
     assert not alone.successful
@@ -264,7 +264,7 @@ def test_a_change_that_is_only_possible_together_is_taken(declared):
 
 
 @pytest.mark.ros
-def test_a_change_is_judged_with_the_present_values(declared):
+def test_a_change_is_checked_with_the_current_values(declared):
     node = declared('-p', 'ground:=false', '-p', 'launch.height:=-5')
     result = node.set_parameters_atomically(change(ground=True))
     assert result.reason.startswith('launch.height: -5 is not allowed; with ground')
@@ -279,7 +279,7 @@ def test_parameters_of_ros_itself_may_change(declared):
 
 @pytest.mark.ros
 def test_through_the_services_of_the_node(declared, new_node, ros_context):
-    """As `ros2 param` asks: describe, and set a double to an integer and a list to integers."""
+    """As `ros2 param` does: describe, and set a double to an integer and a list to integers."""
     node, asker = declared(), new_node(name='asker')
     executor = SingleThreadedExecutor(context=ros_context)
     executor.add_node(node)
