@@ -4,6 +4,7 @@ import ast
 from collections.abc import Iterator
 import math
 from pathlib import Path
+import re
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
@@ -158,6 +159,28 @@ def test_the_angle_of_attack_by_hand(uvw, degrees):
     assert theory.angle_of_attack(*uvw) == pytest.approx(math.radians(degrees))
     arrays = [np.array([x, x]) for x in uvw]
     assert theory.angle_of_attack(*arrays).tolist() == pytest.approx([math.radians(degrees)] * 2)
+
+
+# theory.py has the function and the kernels the compiled one; crosscheck.py is independent.
+ANGLES = ('physics/theory.py', 'physics/kernels/', 'paper/crosscheck.py')
+ANGLE = re.compile(r'\b(?:arctan2|atan2|arctangent)\(\s*(?:\w+\.)*w\b')
+
+
+def test_no_other_module_has_the_angle_of_attack():
+    places = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob('*.py')
+        if ANGLE.search(path.read_text(encoding='utf-8'))
+    }
+    assert {place for place in places if not place.startswith(ANGLES)} == set()
+    assert {home for home in ANGLES if not any(p.startswith(home) for p in places)} == set()
+
+
+@pytest.mark.parametrize(
+    'planted', ['math.atan2(w, math.hypot(u, v))', 'np.arctan2(a.w, u3)', 'atan2(\n    w, u3)']
+)
+def test_an_angle_of_attack_elsewhere_is_noticed(planted):
+    assert ANGLE.search(planted)
 
 
 # ---- no other module turns ----
