@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from disc_sim_ros.errors import ConfigError
 
-# What the simulator publishes, with STATE_QOS where nothing else is said.
+# Published by the simulator, with STATE_QOS unless a comment names another profile.
 ODOM = 'odom'
 POSE = 'pose'
 TRANSFORM = 'transform'
@@ -37,7 +37,7 @@ CLOCK = '/clock'  # CLOCK_QOS
 DIAGNOSTICS = '/diagnostics'
 TF = '/tf'
 
-# What it takes, with COMMAND_QOS.
+# Taken by the simulator, with COMMAND_QOS.
 CMD_MOMENT = 'cmd_moment'
 CMD_COEFFICIENTS = 'cmd_coefficients'
 THROW = 'throw'
@@ -52,7 +52,7 @@ class FlightEvent(StrEnum):
     THROWN = 'thrown'
     LANDED = 'landed'
     RESET = 'reset'
-    FAILED = 'failed'  # the integration
+    FAILED = 'failed'  # the disc moves faster than the step can follow
     COMMAND_EXPIRED = 'command expired'
 
 
@@ -85,7 +85,7 @@ class MessageType:
     PARAMETER_EVENT = 'rcl_interfaces/msg/ParameterEvent'
 
 
-# What acts on a flight from a time on; a re-simulation needs all of it.
+# Inputs that act on a flight, each from its stamp on; a re-simulation needs all of them.
 APPLIED = (APPLIED_MOMENT, APPLIED_COEFFICIENTS, APPLIED_WIND)
 
 # The topics of sim_node that describe a flight beside its motion, and their types.
@@ -134,7 +134,7 @@ class Frames:
         """Return the names with a prefix, which brings its own separator, such as 'red/'.
 
         Raises:
-            ConfigError: A prefix that tf2 or a viewer would stumble over.
+            ConfigError: tf2 or viewers do not accept the prefix.
         """
         if not cls.PREFIX.fullmatch(frame_prefix):
             raise ConfigError('frame_prefix', frame_prefix, f'give {cls.PREFIX_RULE}')

@@ -1,4 +1,4 @@
-"""Bags as others make them, written by rosbags: a body that flies a parabola."""
+"""Bags of another recorder, written by rosbags: a body that flies a parabola."""
 
 from pathlib import Path
 
@@ -69,16 +69,16 @@ def write(folder: Path, topics):
         connections = {
             name: writer.add_connection(
                 name,
-                found if isinstance(found, str) else found[0][1].__msgtype__,
+                messages if isinstance(messages, str) else messages[0][1].__msgtype__,
                 typestore=STORE,
             )
-            for name, found in topics.items()
+            for name, messages in topics.items()
         }
         every = [
             (at, name, m)
-            for name, found in topics.items()
-            if not isinstance(found, str)
-            for at, m in found
+            for name, messages in topics.items()
+            if not isinstance(messages, str)
+            for at, m in messages
         ]
         for at, name, m in sorted(every, key=lambda row: row[0]):
             data = STORE.serialize_cdr(m, m.__msgtype__)
@@ -121,18 +121,18 @@ class Parabola:
         self.rotation = Rotation.from_rotvec(np.outer(self.t, [0.0, 0.0, -self.spin]))
 
     def odometry(self, start=START, *, in_map=False, child='body', skip=(), norm=1.0):
-        """Return messages with their log times; the twist is in `body`, or wrongly in `map`."""
+        """Return messages with their log times; the twist is in `body`, or, wrong, in `map`."""
         linear = self.velocity if in_map else self.rotation.apply(self.velocity, inverse=True)
         turns = self.rotation.as_quat() * norm
-        found = []
+        messages = []
         for i, t in enumerate(self.t):
             if i not in skip:
                 at = start + round(t * SECOND)
                 m = odometry(
                     at, self.position[i], turns[i], linear[i], (0, 0, -self.spin), child=child
                 )
-                found.append((at + 1_000_000, m))
-        return found
+                messages.append((at + 1_000_000, m))
+        return messages
 
     def poses(self, start=START):
         turns = self.rotation.as_quat()

@@ -1,4 +1,4 @@
-"""Motion out of the bytes of messages, and what can be said of it without a simulator."""
+"""Motion from the bytes of messages, and its checks, which need no simulator."""
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
@@ -30,7 +30,7 @@ def raw(messages, topic='/odom', *, little_endian=True):
 
 @pytest.mark.parametrize('little_endian', [True, False])
 @pytest.mark.parametrize('frames', [('map', 'disc'), ('m', ''), ('odometry', 'red/disc')])
-def test_numbers_are_those_of_the_messages_wherever_they_are(frames, little_endian):
+def test_numbers_are_read_at_any_offset_and_in_both_byte_orders(frames, little_endian):
     rng = np.random.default_rng(1)
     numbers = rng.normal(size=(5, 13))
     messages = [
@@ -50,12 +50,12 @@ def test_numbers_are_those_of_the_messages_wherever_they_are(frames, little_endi
     assert_array_equal(motion.log, START + np.arange(5))
 
 
-def test_poses_and_bodies_are_told_apart():
+def test_each_child_frame_and_type_is_a_motion_of_its_own():
     parabola = Parabola()
     both = [*parabola.odometry(child='red/disc'), *parabola.odometry(child='blue/disc')]
-    found = motions(raw(both), ODOMETRY)
-    assert [m.child for m in found] == ['red/disc', 'blue/disc']
-    assert_array_equal(found[0].numbers, found[1].numbers)
+    bodies = motions(raw(both), ODOMETRY)
+    assert [m.child for m in bodies] == ['red/disc', 'blue/disc']
+    assert_array_equal(bodies[0].numbers, bodies[1].numbers)
     (poses,) = motions(raw(parabola.poses(), '/pose'), POSE)
     assert not poses.has_twist
     assert_array_equal(poses.position, parabola.position)
@@ -64,13 +64,13 @@ def test_poses_and_bodies_are_told_apart():
 @pytest.mark.parametrize(
     'change', [lambda d: d[:40], lambda d: b'\x00\x03' + d[2:], lambda d: b'']
 )
-def test_other_bytes_are_refused(change):
+def test_bytes_of_another_kind_are_refused(change):
     (good, *_) = raw(Parabola().odometry())
     with pytest.raises(BagError, match=r'^/odom: '):
         motions([good._replace(data=change(good.data))], ODOMETRY)
 
 
-def test_states_of_the_core_have_the_velocity_over_the_ground():
+def test_states_have_the_velocity_over_the_ground():
     parabola = Parabola()
     (motion,) = motions(raw(parabola.odometry()), ODOMETRY)
     states = paper_frames.states_from_odometry(motion.numbers)
@@ -93,7 +93,7 @@ def test_a_parabola_is_measured_from_its_poses_alone():
     assert_allclose(place[:2], parabola.landing, atol=2e-4)
 
 
-def test_checks_find_what_is_wrong():
+def test_checks_name_what_is_wrong():
     parabola = Parabola()
 
     def failed(**changes):
@@ -113,7 +113,7 @@ def test_checks_find_what_is_wrong():
     assert stamps.longest == pytest.approx(0.03)
 
 
-def test_flights_of_others_end_with_rest_gaps_and_jumps():
+def test_flights_without_throws_end_with_rest_gaps_and_jumps():
     parabola = Parabola()
 
     def rest(start, place):
@@ -137,6 +137,6 @@ def test_flights_of_others_end_with_rest_gaps_and_jumps():
         *parabola.odometry(fourth),
     ]
     (motion,) = motions(raw(messages), ODOMETRY)
-    found = flights(Disc(motion))
-    assert [flight.ended for flight in found] == ['rest', 'gap', 'jump', 'end of the bag']
-    assert [flight.start for flight in found] == [first, second, third, fourth]
+    flown = flights(Disc(motion))
+    assert [flight.ended for flight in flown] == ['rest', 'gap', 'jump', 'end of the bag']
+    assert [flight.start for flight in flown] == [first, second, third, fourth]

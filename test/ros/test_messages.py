@@ -1,4 +1,4 @@
-"""Signs, frames and limits between the core and messages."""
+"""Signs, frames and limits between the physics and messages."""
 
 import math
 
@@ -29,7 +29,7 @@ TUMBLED = Launch(
     speed=12.0, pitch=-70.0, roll=130.0, yaw=200.0, angle_of_attack=40.0, sideslip=-20.0,
     spin=-25.0, roll_rate=3.0, pitch_rate=-4.0, height=2.0,
 ).state()._replace(X=5.0, Y=-3.0, sigma=100.0)  # fmt: skip
-NONSENSE = [math.nan, math.inf, -math.inf, 1e300]
+IMPOSSIBLE = [math.nan, math.inf, -math.inf, 1e300]
 
 
 # To messages.
@@ -72,12 +72,12 @@ def test_rates_by_hand():
 
 
 def test_no_minus_zeros():
-    """They would be read as signs."""
+    """A minus zero would be read as a sign."""
     values = messages.odometry(LEVEL._replace(r=0.0)) + messages.spin_joint(LEVEL)
     assert not any(math.copysign(1.0, v) < 0.0 for v in values if v == 0.0)
 
 
-def test_odometry_against_the_axes_of_the_core():
+def test_odometry_has_the_vectors_of_the_state():
     values = messages.odometry(TUMBLED)
     assert values[:7] == messages.pose(TUMBLED)
     assert_allclose(values[:3], paper_frames.map_from_paper(TUMBLED[:3]), rtol=0.0)
@@ -98,7 +98,7 @@ def test_the_plastic_turns_against_sigma(sigma, angle):
     assert_allclose((z, w), (math.sin(angle / 2), math.cos(angle / 2)), atol=1e-13)
 
 
-def test_pieces_of_a_tuple_fit_their_fields():
+def test_the_fields_have_the_order_of_the_numbers():
     message = TransformStamped()
     for field, value in zip(messages.TRANSFORM_FIELDS, messages.pose(TUMBLED), strict=True):
         assign(message, field, value)
@@ -117,11 +117,11 @@ def test_quantities_of_a_flight():
     setup = Setup(disc=FRISBEE, wind=Wind(mean=(2.0, -3.0, 0.5)))
     trajectory = fly(Launch(), setup, sample_rate=10.0).trajectory
     for i, row in enumerate(trajectory.rows.tolist()):
-        found = messages.quantities(State(*row[1:15]), Velocity(*row[15:]), trajectory.diameter)
+        plotted = messages.quantities(State(*row[1:15]), Velocity(*row[15:]), trajectory.diameter)
         for name in ('airspeed', 'absolute_attitude', 'advance_ratio'):
-            assert_allclose(getattr(found, name), getattr(trajectory, name)[i], rtol=1e-12)
-        assert_allclose(found.angle_of_attack, trajectory.alpha[i], rtol=1e-10)
-        assert found.spin_rate == trajectory.spin[i] > 0.0
+            assert_allclose(getattr(plotted, name), getattr(trajectory, name)[i], rtol=1e-12)
+        assert_allclose(plotted.angle_of_attack, trajectory.alpha[i], rtol=1e-10)
+        assert plotted.spin_rate == trajectory.spin[i] > 0.0
 
 
 @pytest.mark.parametrize('speed', [0.0, 1e-320])
@@ -149,7 +149,7 @@ def test_imu_on_edge():
 
 
 def test_imu_turns_with_the_plastic():
-    """A quarter turn clockwise: what is forward lies to the left of the plastic's own x."""
+    """After a quarter turn clockwise, forward is to the left of the x axis of the plastic."""
     state = LEVEL._replace(sigma=math.pi / 2, p=2.0)
     measured = messages.imu(state, (5.0, 0.0, 10.0), NO_CHANGE, NO_CHANGE, 10.0)
     assert_allclose(measured[:2], (0.0, 2.0), atol=1e-14)
@@ -157,8 +157,8 @@ def test_imu_turns_with_the_plastic():
 
 
 @pytest.mark.parametrize('sigma', [0.0, 1.0, 77.0])
-def test_imu_in_free_fall_feels_only_where_it_is(sigma):
-    """At the centre nothing, at an offset the pull to the axis: w^2 r, in the plastic's axes."""
+def test_imu_in_free_fall_measures_only_the_pull_to_the_axis(sigma):
+    """0 at the centre; at an offset w^2 r towards the axis, in the axes of the plastic."""
     state = TUMBLED._replace(p=0.0, q=0.0, r=60.0, sigma=sigma)
     falling = (0.0, 0.0, 9.81)
     centre = messages.imu(state, falling, NO_CHANGE, (0.0, 0.0, 0.0), 9.81)
@@ -169,7 +169,7 @@ def test_imu_in_free_fall_feels_only_where_it_is(sigma):
 
 @pytest.mark.parametrize('air', ['air', 'vacuum'])
 def test_imu_against_the_motion_of_the_sensor(air):
-    """Differences of where the sensor was, from poses alone, at 5 kHz of a wobbling flight."""
+    """Differences of the position of the sensor, from the poses of a wobbling flight at 5 kHz."""
     offset, h = (0.1, 0.05, 0.02), 2e-4
     launch = Launch(pitch=20.0, roll=10.0, spin=40.0, roll_rate=4.0, pitch_rate=-3.0, height=1.5)
     setup = Setup(disc=FRISBEE, step=h, wind=Wind(mean=(3.0, -2.0, 0.0)))
@@ -236,8 +236,8 @@ def assert_refused(convert, message, thing, frames=FRAMES):
 )
 def test_moment_by_hand(frame, expected):
     """Nose up is a negative torque about y left, more clockwise spin one about z up."""
-    found = messages.moment_from_wrench(wrench(frame, torque=(0.1, -0.2, -0.3)), FRAMES)
-    assert found == (0.1, 0.2, 0.3, expected)
+    moment = messages.moment_from_wrench(wrench(frame, torque=(0.1, -0.2, -0.3)), FRAMES)
+    assert moment == (0.1, 0.2, 0.3, expected)
 
 
 def test_frames_take_the_prefix_but_map_does_not():
@@ -248,12 +248,12 @@ def test_frames_take_the_prefix_but_map_does_not():
 
 
 @pytest.mark.parametrize('prefix', ['/red/', 'a b', 'red\n', 'ü', '-', '.'])
-def test_prefixes_that_would_not_work(prefix):
+def test_prefixes_that_tf2_refuses(prefix):
     with pytest.raises(ConfigError, match='frame_prefix'):
         Frames.prefixed(prefix)
 
 
-@pytest.mark.parametrize('value', [*NONSENSE, 1000.1])
+@pytest.mark.parametrize('value', [*IMPOSSIBLE, 1000.1])
 @pytest.mark.parametrize('axis', range(3))
 def test_torques_out_of_range(axis, value):
     torque = [0.0, 0.0, 0.0]
@@ -262,7 +262,7 @@ def test_torques_out_of_range(axis, value):
     assert_refused(messages.moment_from_wrench, wrench(torque=torque), thing)
 
 
-@pytest.mark.parametrize('value', [*NONSENSE, 1e-300, -1.0])
+@pytest.mark.parametrize('value', [*IMPOSSIBLE, 1e-300, -1.0])
 @pytest.mark.parametrize('axis', range(3))
 def test_forces_are_refused(axis, value):
     force = [0.0, -0.0, 0.0]
@@ -300,12 +300,12 @@ def test_coefficients_have_no_other_frame():
 
 @pytest.mark.parametrize('frame', ['', 'map'])
 def test_wind_by_hand(frame):
-    """To the left and up is negative in the paper's Y right and Z down."""
-    found = messages.wind_from_vector(vector(1.0, 2.0, 3.0, frame=frame), FRAMES)
-    assert found == (1.0, -2.0, -3.0)
+    """Left and up are negative along the paper's Y (right) and Z (down)."""
+    wind = messages.wind_from_vector(vector(1.0, 2.0, 3.0, frame=frame), FRAMES)
+    assert wind == (1.0, -2.0, -3.0)
 
 
-@pytest.mark.parametrize('value', [*NONSENSE, 100.1])
+@pytest.mark.parametrize('value', [*IMPOSSIBLE, 100.1])
 @pytest.mark.parametrize('axis', range(3))
 def test_vectors_out_of_range(axis, value):
     values = [0.0, 0.0, 0.0]
@@ -326,19 +326,19 @@ def test_a_throw_by_hand():
     message.pose.pose.orientation.w = math.sqrt(0.5)
     message.twist.twist.linear.x = 10.0
     message.twist.twist.angular.z = -50.0
-    found = messages.release_from_odometry(message, FRAMES)
-    assert_allclose(found[:6], (0.0, 0.0, -1.5, 0.0, 10.0, 0.0), atol=1e-14)
-    assert found[10:] == (0.0, 0.0, 50.0, 0.0)
-    assert_allclose(found[:10], Launch(speed=10.0, yaw=90.0, pitch=0.0, height=1.5).state()[:10],
+    release = messages.release_from_odometry(message, FRAMES)
+    assert_allclose(release[:6], (0.0, 0.0, -1.5, 0.0, 10.0, 0.0), atol=1e-14)
+    assert release[10:] == (0.0, 0.0, 50.0, 0.0)
+    assert_allclose(release[:10], Launch(speed=10.0, yaw=90.0, pitch=0.0, height=1.5).state()[:10],
                     atol=1e-14)  # fmt: skip
 
 
 @pytest.mark.parametrize('frames', [FRAMES, RED, Frames('', '', '', '')])
 def test_a_throw_there_and_back(frames):
     known = FRAMES if frames.map == '' else frames
-    found = messages.release_from_odometry(thrown(TUMBLED, frames), known)
-    assert_allclose(found, TUMBLED._replace(sigma=0.0), rtol=1e-14, atol=1e-14)
-    again = messages.odometry(found)
+    release = messages.release_from_odometry(thrown(TUMBLED, frames), known)
+    assert_allclose(release, TUMBLED._replace(sigma=0.0), rtol=1e-14, atol=1e-14)
+    again = messages.odometry(release)
     assert_allclose(again, messages.odometry(TUMBLED), rtol=1e-14, atol=1e-14)
 
 
@@ -348,9 +348,9 @@ def test_a_throw_is_normalised():
     assert messages.release_from_odometry(message, FRAMES)[6:10] == (1.0, 0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize('value', NONSENSE)
+@pytest.mark.parametrize('value', IMPOSSIBLE)
 @pytest.mark.parametrize('field', messages.ODOMETRY_FIELDS)
-def test_a_throw_of_nonsense(field, value):
+def test_a_throw_with_an_impossible_number(field, value):
     message = thrown()
     assign(message, field, value)
     assert_refused(messages.release_from_odometry, message, f'throw {field}')
@@ -380,7 +380,7 @@ def test_throws_out_of_range(field, value, thing):
 
 
 def test_names_of_topics_are_relative():
-    """So that namespaces and remapping work; these three are fixed by ROS."""
+    """Namespaces and remapping need that; ROS fixes these three."""
     names = {k: v for k, v in vars(topics).items() if k.isupper() and isinstance(v, str)}
     del names['SPIN_JOINT']
     assert {v for v in names.values() if v.startswith('/')} == {'/clock', '/diagnostics', '/tf'}
