@@ -66,6 +66,14 @@ def event_of(title: str) -> str:
     return title.rpartition(': ')[2]
 
 
+class Loss(StrEnum):
+    """Kinds of losses that recorder_node writes to `custom_data` of a bag, before the topic."""
+
+    DROPPED = 'dropped'
+    LOST = 'lost'
+    GAPS = 'gaps'
+
+
 class NodeTopic:
     """Topics that rclpy gives every node."""
 

@@ -28,8 +28,10 @@ from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight_config import Key, landing_from
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.topics import Loss
 
-_LOSSES = re.compile(r'drop|lost|loss|gap|missed', re.IGNORECASE)
+# Those of recorder_node, and words that other recorders may use.
+_LOSSES = re.compile('|'.join([*Loss, 'drop', 'loss', 'gap', 'missed']), re.IGNORECASE)
 
 
 class WindSource(StrEnum):

@@ -86,3 +86,9 @@ def test_parameters_of_the_wind_profile_are_those_of_sim_node():
 def test_frames_of_a_recorded_disc_are_those_of_its_prefix(prefix):
     frames = Frames.prefixed(prefix)
     assert Frames.of_disc(frames.disc) == frames
+
+
+def test_losses_are_those_of_the_recorder_and_of_others():
+    noted = {f'{loss} /odom': '3' for loss in topics.Loss} | {'drops': '1'}
+    rest = {'recorder': '/recorder_node', 'dropped /pose': '0', 'lost /tf': ''}
+    assert bag_analysis.losses(noted | rest) == list(noted.items())

@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
+from disc_sim_ros.topics import Loss
 
 LITTLE_SPACE = 1024**3  # bytes free on the disk, below which there is a warning
 
@@ -38,9 +39,9 @@ def losses(recorders: Iterable[TopicRecorder]) -> dict[str, int]:
         f'{kind} {recorder.name}': count
         for recorder in recorders
         for kind, count in (
-            ('dropped', recorder.dropped),
-            ('lost', recorder.lost),
-            ('gaps', recorder.missing),
+            (Loss.DROPPED, recorder.dropped),
+            (Loss.LOST, recorder.lost),
+            (Loss.GAPS, recorder.missing),
         )
         if count
     }
