@@ -92,9 +92,7 @@ def test_every_disc_model_and_wind_comes_back_to_the_bit(disc):
         recorded = config(setup, ground=aero is None)
         again = back(recorded)
         assert recorded_bits(again) == recorded_bits(recorded)
-        assert again.setup.plant == recorded.setup.plant
-        assert bits(again.setup.disc.table_rows) == bits(disc.table_rows)
-        assert bits(again.setup.disc.spin_terms) == bits(disc.spin_terms)
+        assert bits(again.setup.plant) == bits(recorded.setup.plant)  # with its tables
         count += 1
     assert count >= len(MODELS) * 2 * len(MOMENT_AXES) * len(WINDS)
 
