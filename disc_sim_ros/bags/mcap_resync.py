@@ -10,7 +10,8 @@ from disc_sim_ros.bags.mcap_records import COMPRESSION_MAGICS, HEAD, ChunkHead, 
 from disc_sim_ros.errors import DamageError
 
 CHUNK_START = 64  # bytes that hold the beginning of a chunk record up to its data
-_WINDOW = 1 << 20  # bytes searched at a time
+_FIRST_WINDOW = 1 << 12  # bytes searched first: mostly the next record is near
+_WINDOW = 1 << 20  # bytes searched at a time at most
 _BLOCK = 1 << 16  # bytes read ahead for small records
 _CHAIN = 3  # records behind each other that are no accident
 # The head of a record that the specification knows, shorter than 2^40 bytes.
@@ -80,13 +81,15 @@ def next_record(source: Source, at: int, channels: dict[int, Channel]) -> int | 
         at: Where to begin the search.
         channels: Those known: of their messages less evidence is asked.
     """
+    size = _FIRST_WINDOW
     while at < source.size:
-        window = source.read(at, _WINDOW + HEAD.size)
+        window = source.read(at, size + HEAD.size)
         for match in _CANDIDATE.finditer(window):
             place = at + match.start()
             if _is_record(source, place, channels):
                 return place
-        at += _WINDOW
+        at += size
+        size = min(2 * size, _WINDOW)
     return None
 
 
