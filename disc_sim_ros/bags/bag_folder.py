@@ -14,13 +14,14 @@ import zstandard
 from disc_sim_ros.bags import metadata
 from disc_sim_ros.bags.contents import Contents, Loss
 from disc_sim_ros.bags.mcap_reader import indexed
-from disc_sim_ros.bags.mcap_records import LZ4_MAGIC, ZSTD_MAGIC
+from disc_sim_ros.bags.mcap_records import LZ4_MAGIC, MAGIC, ZSTD_MAGIC
 from disc_sim_ros.bags.metadata import BagMetadata, FileInfo
 from disc_sim_ros.errors import BagError
 from disc_sim_ros.files import reason
 
-_ENDINGS = ('.mcap', '.mcap.zstd', '.mcap.lz4')
-_NUMBERED = re.compile(r'(.*)_(\d+)\.mcap(\.zstd|\.lz4)?')
+_PACKED = ('.zstd', '.zst', '.lz4')
+_ENDINGS = ('.mcap', *(f'.mcap{ending}' for ending in _PACKED))
+_NUMBERED = re.compile(r'(.*)_(\d+)\.mcap(\.zstd|\.zst|\.lz4)?')
 _BLOCK = 1 << 20  # bytes decompressed at a time
 _OTHERS = (  # how files that are no MCAP begin, and what to do
     (b'SQLite format 3', 'a sqlite3 bag; convert it with `ros2 bag convert`'),
@@ -61,7 +62,7 @@ def bag_folder(path: Path) -> BagFolder:
     if not path.is_dir():
         raise BagError(f'{path}: there is no such bag')
     listed = _metadata(path / metadata.FILE_NAME)
-    present = _present(path)
+    present = _present(path) or _mcap_by_content(path)
     if listed is not None:
         _refuse_storage(path, listed, present)
     if not present:
@@ -199,13 +200,32 @@ def _best(paths: Sequence[Path]) -> Path:
     """
     plain = [p for p in paths if p.name.endswith('.mcap')]
     packed = [p for p in paths if p not in plain]
-    if plain and (not packed or indexed(plain[0]) is not None):
+    if plain and (not packed or _has_end(plain[0])):
         return plain[0]
     return max(packed, key=lambda p: p.stat().st_size)
 
 
+def _has_end(path: Path) -> bool:
+    with path.open('rb') as file:
+        size = file.seek(0, 2)
+        file.seek(max(size - len(MAGIC), 0))
+        return size > len(MAGIC) and file.read() == MAGIC
+
+
 def _plain_name(name: str) -> str:
-    return name.removesuffix('.zstd').removesuffix('.lz4')
+    ending = next((e for e in _PACKED if name.endswith(e)), '')
+    return name.removesuffix(ending)
+
+
+def _mcap_by_content(folder: Path) -> list[Path]:
+    """Return files that begin as MCAP does and are not named so, such as bag_1.mcap.bak."""
+    files = []
+    for path in sorted(folder.iterdir()):
+        if not path.name.startswith('.') and not path.name.endswith(_ENDINGS) and path.is_file():
+            with path.open('rb') as file:
+                if file.read(len(MAGIC)) == MAGIC:
+                    files.append(path)
+    return files
 
 
 def _order(path: Path) -> tuple[int, str]:
@@ -283,13 +303,15 @@ def _compare(path: Path, listed: BagMetadata, present: Sequence[Path]) -> BagFol
             infos[file] = info
         else:
             missing.append(info)
+    if missing:
+        rest |= {f.name: f for f in _mcap_by_content(path)}
     losses = []
     for info in missing:
         other = _substitute(info, len(missing), listed, list(rest.values()))
         if other is None:
             loss = Loss(path / info.path, 0, 0, 'the file is missing', info.message_count)
         else:
-            rest.pop(_plain_name(other.name))
+            rest = {name: f for name, f in rest.items() if f != other}
             infos[other] = info
             loss = Loss(path / info.path, 0, 0, f'it is missing; {other.name} stands for it', 0)
         losses.append(loss)

@@ -27,7 +27,7 @@ def decoder_of(channel: Channel, schema: Schema | None) -> tuple[str, Callable[[
         raise BagError('the bag has no definition of its type')
     try:
         decode = _decoder(channel, schema)
-    except Exception as error:  # the parser raises whatever it stumbles over
+    except Exception as error:  # the parser raises errors of many kinds
         is_service = schema.data.startswith(_SERVICE)  # rosbag2 keeps a .srv file for its events
         text = schemas.definition(schema.name) if is_service else None
         if text is None:

@@ -67,7 +67,10 @@ def test_a_cut_file_is_said_to_lack_what_metadata_counts(folder):
     assert '110 messages' in loss
 
 
-@pytest.mark.parametrize('name', ['flight_1.mcap', 'old 1.mcap', 'backup.mcap', 'bag_1.mcap.zstd'])
+@pytest.mark.parametrize(
+    'name',
+    ['flight_1.mcap', 'old 1.mcap', 'backup.mcap', 'bag_1.mcap.zstd', 'bag_1.mcap.bak', 'bag_1'],
+)
 def test_a_renamed_file_is_found_and_stands_in_its_place(folder, name):
     (folder / 'bag_1.mcap').rename(folder / name)
     expected = ['bag_1.mcap: 0 messages: it is missing'] if 'zstd' not in name else []
@@ -86,6 +89,12 @@ def test_several_renamed_files_are_recognised_by_their_content(folder):
 def test_a_bag_all_of_whose_files_were_renamed_is_read(folder):
     for path in folder.glob('*.mcap'):
         path.rename(folder / path.name.replace('bag', 'flight'))
+    check(folder, COUNTS)
+
+
+def test_a_bag_whose_files_lost_their_ending_is_read(folder):
+    for path in folder.glob('*.mcap'):
+        path.rename(path.with_suffix(''))
     check(folder, COUNTS)
 
 
@@ -160,14 +169,14 @@ def test_the_program_names_lost_messages_in_its_document(folder, capsys):
 
 def compress_files(folder: Path, numbers: range, ending: str = '.zstd') -> None:
     """Compress files as rosbag2 does in the mode FILE."""
-    compress = zstandard.ZstdCompressor().compress if ending == '.zstd' else lz4.frame.compress
+    compress = lz4.frame.compress if ending == '.lz4' else zstandard.ZstdCompressor().compress
     for number in numbers:
         path = folder / f'bag_{number}.mcap'
         path.with_name(path.name + ending).write_bytes(compress(path.read_bytes()))
         path.unlink()
 
 
-@pytest.mark.parametrize('ending', ['.zstd', '.lz4'])
+@pytest.mark.parametrize('ending', ['.zstd', '.zst', '.lz4'])
 @pytest.mark.parametrize('listed', ['plain', 'packed', 'no metadata'])
 @pytest.mark.parametrize('numbers', [range(4), range(3)])
 def test_compressed_files_are_read_and_repaired(folder, numbers, listed, ending):
