@@ -1,12 +1,12 @@
-"""How many flights at once, how exactly, and how time and memory grow with their number.
+"""Measure ensembles: flights per second, errors, and time and memory over the number of flights.
 
 Flights are throws of the paper's Fig. 5 with some scatter in speed, pitch and spin, flown by
-`disc_sim_ros.physics.ensemble.fly_many`; beside it a loop of `flight.fly`, and the same equations
-in plain numpy (benchmarks/numpy_flights.py). Errors are of the landing point against an
-independent integration with a tolerance of 1e-12 (test/reference): of that throw, of the worst of
-its neighbours, and of the worst of three that are released wobbling or spin faster, whose nutation
-asks for shorter steps. Rates per CPU-second are of one thread. The last lines are of the longest
-step that keeps Fig. 5 and its neighbours below 1 mm.
+`disc_sim_ros.physics.ensemble.fly_many`. They are compared with a loop of `flight.fly`, and with
+the same equations in plain numpy (benchmarks/numpy_flights.py). The error is that of the landing
+point against an independent integration with a tolerance of 1e-12 (test/reference): of this throw,
+the largest of its neighbours, and the largest of three with a wobble or a faster spin, whose
+nutation needs shorter steps. Rates per CPU-second are of one thread. The last lines are for the
+longest step with errors below 1 mm for Fig. 5 and its neighbours.
 
 usage: benchmarks/ensemble.py [--largest COUNT] (default 1000000 flights)
 """
@@ -50,14 +50,14 @@ FLAT = 1.25  # times the memory of a tenth of the flights
 
 
 def main() -> None:
-    """Print what was measured."""
+    """Print the measurements."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--largest', type=float, default=1e6)
     print_lines(lines(parser.parse_args().largest))
 
 
 def lines(largest: float = 1e6) -> tuple[Line, ...]:
-    """Measure up to so many flights, print tables and return what stands out."""
+    """Measure up to `largest` flights, print tables and return the lines of the report."""
     disc = disc_file.load_disc('frisbee')
     cores = os.cpu_count() or 1
     print(f'{cpu_name()}, {cores} cores; Python {platform.python_version()}, '
@@ -134,10 +134,10 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
 
 
 def landing_errors(setup: Setup, references: list[list[float]]) -> list[float]:
-    """Return how far off the launches of NEAR and FAR land [m]."""
+    """Return the landing errors of the launches of NEAR and FAR [m]."""
     launches = (*NEAR, *FAR)
-    found = fly_many({name: [getattr(x, name) for x in launches] for name in LAUNCH}, setup)
-    ends = zip(found.x, found.y, found.z, strict=True)
+    landings = fly_many({name: [getattr(x, name) for x in launches] for name in LAUNCH}, setup)
+    ends = zip(landings.x, landings.y, landings.z, strict=True)
     return [math.dist(end, landing) for end, landing in zip(ends, references, strict=True)]
 
 
@@ -181,7 +181,7 @@ def numpy_rate(setup: Setup, references: list[list[float]]) -> tuple[float, floa
 
 
 def timed_batches(setup: Setup, count: int) -> float:
-    """Return the seconds of an ensemble of which only the mean range is kept."""
+    """Return the seconds of an ensemble that keeps only the sum of the ranges."""
     total = 0.0
     begun = time.perf_counter()
     for seed, start in enumerate(range(0, count, BATCH)):

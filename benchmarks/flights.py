@@ -1,10 +1,9 @@
-"""How many flights of the paper's Fig. 5 throw one core flies in a CPU-second, and how exactly.
+"""Measure flights of the paper's Fig. 5 throw per CPU-second of one core, and their errors.
 
-Each flight is one call of `disc_sim_ros.physics.flight.fly`, from the launch to the landing, as
-any program would make it. Errors are of the landing point, against an independent integration with
-a tolerance of 1e-12 (test/reference), and count in the worst of a few launches, not only the one
-that is timed. The last lines are the fastest step whose errors all stay below 1 mm, and the
-default one.
+Each flight is one call of `disc_sim_ros.physics.flight.fly`, from the launch to the landing. The
+error is that of the landing point against an independent integration with a tolerance of 1e-12
+(test/reference), the largest of a few launches. The last lines are for the longest step with all
+errors below 1 mm, and for the default step.
 
 usage: benchmarks/flights.py
 """
@@ -40,7 +39,7 @@ NEIGHBOURS = (FIG_5, Launch(speed=15.3), Launch(pitch=14.0), Launch(spin=-31.416
 
 
 def main() -> None:
-    """Print what was measured."""
+    """Print the measurements."""
     if os.environ.get('NUMBA_DISABLE_JIT') == '1':
         print(
             time_per_flight(Setup(disc=disc_file.load_disc('frisbee'), step=STEPS[-1]), rounds=3)
@@ -50,13 +49,13 @@ def main() -> None:
 
 
 def lines() -> tuple[Line, ...]:
-    """Measure every step, print a table and return what stands out."""
+    """Measure every step, print a table and return the lines of the report."""
     disc = disc_file.load_disc('frisbee')
     landings = [landing_of_reference(launch) for launch in NEIGHBOURS]
     print(f'{cpu_name()}, {os.cpu_count()} cores; Python {platform.python_version()}, '
           f'numba {numba.__version__}, numpy {np.__version__}')  # fmt: skip
     print('step, ms   error of Fig. 5, mm   worst of 4 launches, mm   us/flight   flights/CPU-s')
-    best, found = (0.0, 0.0, 0.0), []
+    best, measured = (0.0, 0.0, 0.0), []
     for step in STEPS:
         setup = Setup(disc=disc, step=step)
         errors = [
@@ -66,9 +65,9 @@ def lines() -> tuple[Line, ...]:
         seconds = time_per_flight(setup, ROUNDS)
         print(f'{step * 1e3:8g} {errors[0] * 1e3:21.6f} {max(errors) * 1e3:25.6f} '
               f'{seconds * 1e6:11.1f} {1 / seconds:15.0f}')  # fmt: skip
-        found.append((1 / seconds, step, max(errors)))
+        measured.append((1 / seconds, step, max(errors)))
         if max(errors) < ALLOWED:
-            best = max(best, found[-1])
+            best = max(best, measured[-1])
     rate, step, error = best
     plain = 1.0 / plain_python_time()
     return (
@@ -81,22 +80,22 @@ def lines() -> tuple[Line, ...]:
         ),
         Line(
             what='the same, default step',
-            ours=f'{number(found[0][0])} per CPU-second in {found[0][1] * 1e3:g} ms steps, '
-            f'{number(found[0][2] * 1e3, 1)} mm off',
+            ours=f'{number(measured[0][0])} per CPU-second in {measured[0][1] * 1e3:g} ms steps, '
+            f'{number(measured[0][2] * 1e3, 1)} mm off',
             beside=f'{step * 1e3:g} ms steps',
-            ratio=found[0][0] / rate,
+            ratio=measured[0][0] / rate,
         ),
         Line(
             what=f'the same, {STEPS[-1] * 1e3:g} ms steps',
-            ours=f'{number(found[-1][0])} per CPU-second',
+            ours=f'{number(measured[-1][0])} per CPU-second',
             beside=f'plain Python (NUMBA_DISABLE_JIT=1) {number(plain)}',
-            ratio=found[-1][0] / plain,
+            ratio=measured[-1][0] / plain,
         ),
     )
 
 
 def time_per_flight(setup: Setup, rounds: int) -> float:
-    """Return the CPU seconds of one flight, in the best of a few rounds."""
+    """Return the CPU seconds of one flight, the best of a few rounds."""
     fly(FIG_5, setup)
     start = time.process_time()
     fly(FIG_5, setup)
@@ -111,7 +110,7 @@ def time_per_flight(setup: Setup, rounds: int) -> float:
 
 
 def landing_of_reference(launch: Launch) -> list[float]:
-    """Return where the independent integration lands [m], in map."""
+    """Return the landing point of the independent integration [m], in map."""
     thrown = asdict(launch)
     thrown['alpha'] = thrown.pop('angle_of_attack')
     return list(reference_flight(FRISBEE, thrown)['landing_position_m'])
@@ -127,7 +126,7 @@ def plain_python_time() -> float:
 
 
 def cpu_name() -> str:
-    """Return what /proc calls the processor, or what Python knows."""
+    """Return the name of the processor from /proc, or from Python."""
     try:
         lines = Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
     except OSError:

@@ -1,8 +1,8 @@
 # ruff: noqa: N806 - the paper's letters
-"""The equations of `core.equations` in plain numpy, over arrays of flights: a baseline.
+"""The equations of `kernels.equations` in plain numpy, over arrays of flights: a baseline.
 
-The exact model with table aerodynamics and moments in body axes, in still air, classic RK4. What
-most people would write first; every operation makes an array, and all flights keep step.
+The exact model with table aerodynamics and moments in body axes, in still air, classic RK4: the
+usual first program. Every operation makes an array, and all flights make the same steps.
 """
 
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ def fly(states: 'FloatArray', setup: 'Setup') -> 'FloatArray':
     """Fly to the ground.
 
     Args:
-        states: States at release, as `core.equations.State`, shape (14, n).
+        states: States at release, as `kernels.equations.State`, shape (14, n).
         setup: Disc, air and step.
 
     Returns:

@@ -1,10 +1,11 @@
 # ruff: noqa: N806 - the paper's letters
 """The same flight in three kinds of axes, by the same fixed-step Runge-Kutta loop.
 
-DESPUN is `core.equations`: attitude and rates in axes that tilt with the disc but do not spin.
-SPINNING has them in axes fixed in the disc, with eqn 11 as printed: nothing else differs. PRINTED
-has the velocity in axes fixed in the disc as well: eqns 10 and 11 as the paper prints them.
-Forces and moments are those of `core` in all three; still air, no control, the exact model.
+DESPUN is `kernels.equations`: attitude and rates in axes that tilt with the disc but do not spin.
+SPINNING has both in axes fixed in the disc, with eqn 11 as printed; nothing else differs. PRINTED
+also has the velocity in axes fixed in the disc: eqns 10 and 11 as the paper prints them. Forces
+and moments are those of `kernels.equations` in all three, in still air, without control inputs,
+for the exact model.
 """
 
 import math
@@ -105,14 +106,14 @@ def flown(
 
 @entry
 def rates(y: 'FloatArray', axes: int, plant: Plant) -> State:
-    """Return `derivative` of a state that comes as an array, shape (14,), for scipy."""
+    """Return `derivative` of a state given as an array, shape (14,), for scipy."""
     s = State(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11], y[12],
               y[13])  # fmt: skip
     return derivative(s, axes, plant)
 
 
 def released(state: State, axes: int) -> State:
-    """Return a state at release, spin angle 0, for these axes; its axes 2 are all the same."""
+    """Return a state at release in these axes; at spin angle 0 their axes 2 are the same."""
     if axes != PRINTED:
         return state
     xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation_elements(*state[6:10])

@@ -1,7 +1,7 @@
-"""How long `fly` takes from its start to its answer, beside Python that only imports numba.
+"""Measure `fly` from its start to its answer, next to Python that only imports numba.
 
-Wall time of whole processes, the best of a few; cold is with an empty cache of machine code, as
-on a new machine.
+Wall time of whole processes, the best of a few. The first time on a machine is measured with an
+empty cache of machine code.
 
 usage: benchmarks/startup.py
 """
@@ -21,13 +21,13 @@ IMPORTS = [sys.executable, '-c', 'import numpy, numba']
 
 
 def main() -> None:
-    """Print what was measured."""
+    """Print the measurements."""
     print_lines(lines())
 
 
 def lines() -> tuple[Line, ...]:
-    """Measure both starts in turns."""
-    seconds(FLY)  # compiles, if need be
+    """Measure both starts alternately."""
+    seconds(FLY)  # compiles if necessary
     pairs = [(seconds(FLY), seconds(IMPORTS)) for _ in range(ROUNDS)]
     warm, imports = (min(times) for times in zip(*pairs, strict=True))
     with tempfile.TemporaryDirectory() as empty:

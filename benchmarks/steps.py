@@ -1,10 +1,10 @@
-"""The error over the step, in axes that do not spin and in axes fixed in the disc.
+"""Measure the error over the step, in axes that do not spin and in axes fixed in the disc.
 
-Each launch flies for the time after which the independent integration of test/reference lands
-(tolerance 1e-12), and its end is compared with that landing. All three kinds of axes of
-benchmarks/spinning.py run through the same compiled loop, and cost CPU time in the same way. What
-is checked first: that loop in despun axes against `flight.fly`, and both spinning ones against
-scipy's DOP853 with a tolerance of 1e-12.
+Each launch flies for the time of flight of the independent integration of test/reference
+(tolerance 1e-12), and its end is compared with that landing. The three kinds of axes of
+benchmarks/spinning.py run in the same compiled loop. Before that, the loop in despun axes is
+checked against `flight.fly`, and the two with axes that spin against scipy's DOP853 with a
+tolerance of 1e-12.
 
 usage: benchmarks/steps.py [--write]   (--write: docs/steps.csv and docs/steps.png)
 """
@@ -46,11 +46,11 @@ STEPS = tuple(
     for m in (1.0, 1.4, 2.0, 3.0, 5.0, 7.0)
     if m * 10.0**e < 0.0501
 )  # s
-FINE = np.geomspace(5e-4, 5e-2, 241)  # s, where the longest step within ALLOWED is sought
+FINE = np.geomspace(5e-4, 5e-2, 241)  # s, searched for the longest step within ALLOWED
 ALLOWED = 1e-3  # m
 ROUNDS = 3
 ROUND_S = 0.02  # CPU seconds a round
-OFF = 1.0  # m: a flight that is further off has nothing to do with the throw
+OFF = 1.0  # m: a larger error has nothing to do with the throw
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Point:
     launch: str
     axes: str
     step: float  # s
-    error: float  # m at the landing; infinite if it blew up or the step is refused
+    error: float  # m at the landing; infinite if it diverges or the step is refused
     evaluations: int  # of the equations of motion
     seconds: float  # CPU time
 
@@ -76,14 +76,14 @@ class Throw:
 
 
 def main() -> None:
-    """Measure, print, and write table and picture if asked to."""
+    """Measure, print, and with --write also write the table and the picture."""
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
     parser.add_argument('--write', action='store_true', help='write docs/steps.csv and .png')
     print_lines(lines(write=parser.parse_args().write))
 
 
 def lines(*, write: bool = False) -> tuple[Line, ...]:
-    """Measure and print every flight; return what the despun axes are worth."""
+    """Measure and print every flight; return the savings of despun axes."""
     setup = Setup(disc=disc_file.load_disc('frisbee'))
     throws = [landed(name, launch) for name, launch in LAUNCHES.items()]
     for throw in throws:
@@ -94,7 +94,7 @@ def lines(*, write: bool = False) -> tuple[Line, ...]:
     if write:
         write_csv(DOCS / 'steps.csv', points)
         (DOCS / 'steps.png').write_bytes(picture(points))
-    return tuple(worth(throw, setup) for throw in throws)
+    return tuple(savings(throw, setup) for throw in throws)
 
 
 def landed(name: str, launch: Launch) -> Throw:
@@ -107,9 +107,9 @@ def landed(name: str, launch: Launch) -> Throw:
 
 
 def off(throw: Throw, axes: int, step: float, setup: Setup) -> float:
-    """Return how far from its landing a flight is at that time [m].
+    """Return the distance of the end of a flight from the landing [m].
 
-    Infinite if it blew up, or if `fly` refuses the step.
+    Infinite if the flight diverges, or if `fly` refuses the step.
     """
     if axes == DESPUN:
         try:
@@ -123,15 +123,15 @@ def off(throw: Throw, axes: int, step: float, setup: Setup) -> float:
 
 
 def check(throw: Throw, setup: Setup) -> None:
-    """Print by how much the ways to compute one flight differ.
+    """Print the differences between the ways to compute one flight.
 
     Raises:
-        SystemExit: More than can be; what is measured here would mean nothing.
+        SystemExit: A difference is too large, so that measurements would be meaningless.
     """
     state = throw.launch.state()
-    by_core = fly(throw.launch, setup, duration=throw.time, ground=False).end
-    same = math.dist(by_core[:3], flown(state, DESPUN, setup.step, throw.time, setup.plant)[:3])
-    found = {'despun loop from flight.fly': (same, 1e-12)}
+    by_fly = fly(throw.launch, setup, duration=throw.time, ground=False).end
+    same = math.dist(by_fly[:3], flown(state, DESPUN, setup.step, throw.time, setup.plant)[:3])
+    differences = {'despun loop from flight.fly': (same, 1e-12)}
     for axes in (SPINNING, PRINTED):
         solution = solve_ivp(
             lambda _, y, axes=axes: rates(y, axes, setup.plant),
@@ -142,11 +142,13 @@ def check(throw: Throw, setup: Setup) -> None:
             atol=1e-12,
         )
         error = math.dist(solution.y[:3, -1], throw.landing)
-        found[f'DOP853 of {AXES[axes]} from the reference'] = (error, 1e-7)
-    found['despun at 0.02 ms from the reference'] = (off(throw, DESPUN, 2e-5, setup), 1e-7)
-    print(f'{throw.name}: ' + ', '.join(f'{name} {d:.0e} m' for name, (d, _) in found.items()))
-    if not all(difference <= most for difference, most in found.values()):
-        raise SystemExit('steps: the ways to compute this flight differ by more than they may')
+        differences[f'DOP853 of {AXES[axes]} from the reference'] = (error, 1e-7)
+    differences['despun at 0.02 ms from the reference'] = (off(throw, DESPUN, 2e-5, setup), 1e-7)
+    print(
+        f'{throw.name}: ' + ', '.join(f'{name} {d:.0e} m' for name, (d, _) in differences.items())
+    )
+    if not all(difference <= most for difference, most in differences.values()):
+        raise SystemExit('steps: the ways to compute this flight differ by more than allowed')
 
 
 def point(throw: Throw, axes: int, step: float, setup: Setup) -> Point:
@@ -157,7 +159,7 @@ def point(throw: Throw, axes: int, step: float, setup: Setup) -> Point:
 
 
 def cpu(throw: Throw, axes: int, step: float, setup: Setup) -> float:
-    """Return the CPU seconds of one flight, in the best of a few rounds."""
+    """Return the CPU seconds of one flight, the best of a few rounds."""
     state = released(throw.launch.state(), axes)
     arguments = (state, axes, step, throw.time, setup.plant)
     best, count = math.inf, 1
@@ -171,23 +173,23 @@ def cpu(throw: Throw, axes: int, step: float, setup: Setup) -> float:
 
 
 def longest_step(throw: Throw, axes: int, setup: Setup) -> float:
-    """Return the longest step that is within ALLOWED, as are all shorter ones [s]."""
+    """Return the longest step [s] up to which all errors are within ALLOWED."""
     good = takewhile(lambda h: off(throw, axes, float(h), setup) <= ALLOWED, FINE)
     return float(list(good)[-1])
 
 
-def worth(throw: Throw, setup: Setup) -> Line:
-    """Return what the despun axes save at the same error."""
+def savings(throw: Throw, setup: Setup) -> Line:
+    """Return the savings of despun axes at the same error."""
     step = {axes: longest_step(throw, axes, setup) for axes in AXES}
     rounds = [{axes: cpu(throw, axes, step[axes], setup) for axes in AXES} for _ in range(3)]
     cost = {axes: min(costs[axes] for costs in rounds) for axes in AXES}
-    told = {axes: f'{number(step[axes] * 1e3, 3)} ms steps, {number(cost[axes] * 1e6)} us'
+    texts = {axes: f'{number(step[axes] * 1e3, 3)} ms steps, {number(cost[axes] * 1e6)} us'
             for axes in AXES}  # fmt: skip
     return Line(
         what=f'{throw.name}, {ALLOWED * 1e3:g} mm off',
-        ours=f'{told[DESPUN]} a flight',
-        beside=f'attitude and rates in axes fixed in the disc {told[SPINNING]}; '
-        f'velocity too {told[PRINTED]}',
+        ours=f'{texts[DESPUN]} a flight',
+        beside=f'attitude and rates in axes fixed in the disc {texts[SPINNING]}; '
+        f'velocity too {texts[PRINTED]}',
         ratio=cost[SPINNING] / cost[DESPUN],
     )
 
@@ -254,7 +256,7 @@ def picture(points: list[Point]) -> bytes:
             panel.set_ylabel('error at the landing [mm]')
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc='outside lower center', ncols=3)
-        figure.suptitle('Same equations, same RK4: what the axes are worth', x=0.012, ha='left',
+        figure.suptitle('Same equations, same RK4, different axes', x=0.012, ha='left',
                         fontsize=13, fontweight='bold')  # fmt: skip
         return image(figure, 'png', LIGHT)
 

@@ -2,9 +2,9 @@
 
 Usage: python benchmarks/sweep.py [--longest SECONDS] [--short] [COUNT ...]
 
-Each count is one run of the program, a Monte Carlo of six scattered quantities of the Fig. 5 throw
-into a Parquet file, with its summary; time and memory are those that the system reports for it.
---short flies one step of 20 ms each: what drawing, writing, joining and summing up cost alone.
+Each count is one run of the program: a Monte Carlo study of the Fig. 5 throw with six scattered
+quantities, into a Parquet file, with its summary. The system reports its time and memory. With
+--short each flight is one step of 20 ms: the cost of sampling, writing, joining and statistics.
 """
 
 import argparse

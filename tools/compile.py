@@ -1,4 +1,4 @@
-"""Compile the equations of motion into the cache, before several processes would do so at once."""
+"""Compile the equations of motion into the cache, so that parallel tests need not."""
 
 from concurrent.futures import ProcessPoolExecutor, wait
 import multiprocessing
@@ -10,18 +10,20 @@ from disc_sim_ros.physics.launch import Launch
 SETUP = flight.Setup(disc=disc_file.load_disc('frisbee'))
 
 
-def of_one_flight() -> None:
-    """Compile what `flight.fly` and the simulator run."""
+def compile_single_flights() -> None:
+    """Compile the functions of `flight.fly` and of the simulator."""
     flight.fly(Launch(), SETUP, duration=0.01, ground=False)
     simulator.warm_up()
 
 
-def of_many_flights() -> None:
-    """Compile what runs many flights side by side."""
+def compile_ensembles() -> None:
+    """Compile the loop over many flights."""
     fly_many({}, SETUP, duration=0.01, ground=False)
 
 
 if __name__ == '__main__':
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context('spawn')) as pool:
-        for future in wait([pool.submit(of_one_flight), pool.submit(of_many_flights)]).done:
+        for future in wait(
+            [pool.submit(compile_single_flights), pool.submit(compile_ensembles)]
+        ).done:
             future.result()

@@ -1,4 +1,4 @@
-"""Every constant of a disc and of the air matters, in the direction that physics says."""
+"""Every constant of a disc and of the air changes the flight, in the direction of physics."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 from sample_discs import FRISBEE, VACUUM
 
-# A wobble, so that inertia and damping show.
+# A wobble, so that inertia and damping have an effect.
 LAUNCH = Launch(roll_rate=4.0, height=1.0)
 PROPERTIES = (
     'mass',
@@ -36,38 +36,38 @@ def landing(disc, **setup):
 
 @pytest.mark.parametrize('name', PROPERTIES)
 @pytest.mark.parametrize('model', ['exact', 'constant_spin', 'precession'])
-def test_each_constant_of_a_disc_matters(name, model):
-    """One per cent more (less for I_z, which could not be a flat disc's) moves the landing."""
+def test_each_constant_of_a_disc_moves_the_landing(name, model):
+    """By one per cent more; less for I_z, as more would be impossible for a flat disc."""
     factor = 0.99 if name == 'inertia_axial' else 1.01
     changed = dataclasses.replace(FRISBEE, **{name: getattr(FRISBEE, name) * factor})
-    moved = np.linalg.norm(landing(changed, model=model) - landing(FRISBEE, model=model))
+    shift = np.linalg.norm(landing(changed, model=model) - landing(FRISBEE, model=model))
     unused = (model != 'exact' and name == 'C_Nr') or (
         model == 'precession' and name == 'inertia_diametral'
     )
-    if unused:  # spin is kept; without nutation the transverse inertia has no part
-        assert moved == 0.0
+    if unused:  # the spin is constant; without nutation the transverse inertia is not used
+        assert shift == 0.0
     else:
-        assert moved > 1e-5
+        assert shift > 1e-5
 
 
 @pytest.mark.parametrize('name', LINES)
-def test_each_coefficient_of_the_lines_matters(name):
+def test_each_coefficient_of_the_lines_moves_the_landing(name):
     lines = FRISBEE.linear
     changed = dataclasses.replace(lines, **{name: getattr(lines, name) * 1.01})
     disc = dataclasses.replace(FRISBEE, linear=changed)
     assert np.linalg.norm(landing(disc, aero='linear') - landing(FRISBEE, aero='linear')) > 1e-5
-    assert np.array_equal(landing(disc), landing(FRISBEE))  # but not for the table
+    assert np.array_equal(landing(disc), landing(FRISBEE))  # but not with the table
 
 
 @pytest.mark.parametrize('column', [0, 1, 2])
-def test_each_column_of_the_table_matters(column):
+def test_each_column_of_the_table_moves_the_landing(column):
     changed = FRISBEE.table.coefficients.copy()
     changed[:, column] *= 1.01
     disc = dataclasses.replace(FRISBEE, table=AeroTable(FRISBEE.table.alpha_deg, changed))
     assert np.linalg.norm(landing(disc) - landing(FRISBEE)) > 1e-5
 
 
-def test_the_air_matters():
+def test_density_gravity_and_wind_move_the_landing():
     here = landing(FRISBEE)
     for air in (Air(density=1.2), Air(gravity=9.8)):
         assert np.linalg.norm(landing(FRISBEE, air=air) - here) > 1e-3
@@ -80,8 +80,9 @@ def spin_table(value):
 
 
 def test_side_force_due_to_spin_pushes_to_the_side():
-    """C_Side > 0 pushes along y of axes 3, to the right of the flow, and the other way for the
-    other spin: dV_y/dt = C_Side q S / m with C_Side = value AdvR.
+    """C_Side > 0 pushes along y of axes 3, to the right of the flow; opposite for opposite spin.
+
+    dV_y/dt = C_Side q S / m with C_Side = value AdvR.
     """
     disc = dataclasses.replace(FRISBEE, spin_side_force=spin_table(0.1))
     for spin in (40.0, -40.0):
@@ -105,11 +106,11 @@ def test_rolling_moment_due_to_spin_precesses_the_nose():
         ratio = 60.0 * disc.diameter / 30.0
         q = 0.05 * ratio * 0.5 * 1.225 * 15.0**2 * disc.area * disc.diameter
         q /= 60.0 * disc.inertia_axial
-        # The damping at this rate is a hundredth of the gyroscopic moment, and acts across.
+        # Damping at this rate is a hundredth of the gyroscopic moment, and perpendicular to it.
         assert_allclose(end.q, q, rtol=0.1)
 
 
-def test_spin_tables_are_bilinear_odd_and_held_outside():
+def test_spin_tables_are_bilinear_odd_and_constant_outside():
     from disc_sim_ros.physics.kernels.aerodynamics import spin_coefficients
 
     disc = dataclasses.replace(
@@ -127,8 +128,8 @@ def test_spin_tables_are_bilinear_odd_and_held_outside():
         (-1.25, 45.0, -4.5, -0.5),
         (0.0, 10.0, 0.0, 0.0),
     ):
-        found = spin_coefficients(ratio, math.radians(degrees), disc.spin_terms)
-        assert_allclose(found, (C_L, C_Side), atol=1e-15)
+        pair = spin_coefficients(ratio, math.radians(degrees), disc.spin_terms)
+        assert_allclose(pair, (C_L, C_Side), atol=1e-15)
 
 
 def test_table_is_linear_between_uneven_rows_and_exact_on_them():
@@ -139,9 +140,9 @@ def test_table_is_linear_between_uneven_rows_and_exact_on_them():
     table = AeroTable.of(alpha_deg=degrees, CL=CL, CD=np.abs(CL), CM=np.negative(CL))
     disc = dataclasses.replace(FRISBEE, table=table)
     for x in np.concatenate([degrees[:-1], np.linspace(-90, 90, 181)]):
-        found = table_coefficients(math.radians(x), disc.table_rows)
+        values = table_coefficients(math.radians(x), disc.table_rows)
         y = np.interp(x, degrees, CL)
-        assert_allclose(found, (y, np.interp(x, degrees, np.abs(CL)), -y), atol=1e-13)
+        assert_allclose(values, (y, np.interp(x, degrees, np.abs(CL)), -y), atol=1e-13)
 
 
 def test_impossible_discs_are_refused():
@@ -158,7 +159,7 @@ def test_impossible_discs_are_refused():
 
 
 def test_derived_quantities_of_the_paper():
-    """The text's own numbers: -2.14 is eqn 64 as printed for the flat plate at AdvR 1."""
+    """Numbers of the text: -2.14 is eqn 64 as printed, for the flat plate at AdvR 1."""
     plate = disc_file.load_disc('flat_plate')
     k_n = theory.static_margin(plate)
     assert k_n == pytest.approx(-0.66 / 2.46)
@@ -178,7 +179,7 @@ def test_derived_quantities_of_the_paper():
 
 @pytest.mark.parametrize('AdvR', [0.5, 1.0, 3.0])
 def test_eqn_64_follows_from_54_and_58_to_63(AdvR):
-    """The chain of substitutions, in numbers, ends at 4 k_n / AdvR and not at 8."""
+    """The chain of substitutions, in numbers, gives 4 k_n / AdvR and not 8 k_n / AdvR."""
     m, c, V, g, k_n, rho = 0.015, 0.12, 15.7, 9.81, -0.27, 1.225
     S = math.pi * c**2 / 4
     pressure = 0.5 * rho * V**2

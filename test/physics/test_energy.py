@@ -1,4 +1,4 @@
-"""Energy: where it only falls, how fast, and where the model itself lets it rise."""
+"""Energy: where it can only fall, how fast, and where the model lets it rise."""
 
 import dataclasses
 import math
@@ -28,9 +28,9 @@ def energy(t, disc, gravity=9.81, *, rotation):
 
 
 def rises(launch, setup, *, rotation, control=NO_CONTROL, duration=0.3):
-    """By how much the energy of a flight rises at most, and what the integration may add to it.
+    """The largest rise of the energy in a flight, and a bound of the integration error in it.
 
-    Halving a step takes 15/16 of an error of fourth order away, and at a corner of a table, where
+    Halving the step removes 15/16 of an error of fourth order and, at a corner of a table where
     the order is lower, at least 3/4: four thirds of the change bound the error.
     """
     duration = min(duration, 300 * setup.step)
@@ -44,17 +44,17 @@ def rises(launch, setup, *, rotation, control=NO_CONTROL, duration=0.3):
 @thorough(80)
 @given(launches(), setups(), CONTROLS)
 @example(Launch(spin=1000.0, speed=0.0, roll_rate=500.0), Setup(disc=DISCS['wraith']), NO_CONTROL)
-def test_in_still_air_the_path_only_loses_energy(launch, setup, control):
-    """Air takes C_Drag q S V, lift and side force do no work, and controls are moments alone.
+def test_in_still_air_the_energy_of_the_path_only_falls(launch, setup, control):
+    """Drag takes C_Drag q S V, lift and side force do no work, and control inputs are moments.
 
-    Kinetic and potential energy of the centre fall in every model, whatever the disc does.
+    So kinetic and potential energy of the centre fall in every model and every motion.
     """
-    risen, allowed = rises(launch, resolved(setup, launch), rotation=0.0, control=control)
-    assert risen <= allowed
+    rise, allowed = rises(launch, resolved(setup, launch), rotation=0.0, control=control)
+    assert rise <= allowed
 
 
 def drag_and_pitch(setup, alpha):
-    """C_Drag and C_M at angles of attack [rad], by numpy from the disc's own numbers."""
+    """C_Drag and C_M at angles of attack [rad], by numpy from the numbers of the disc."""
     line, table = setup.disc.linear, setup.disc.table
     if (setup.aero or setup.disc.aero) == 'linear':
         C_D = line.CD_0 + line.CD_alpha * (alpha - line.alpha_0) ** 2
@@ -64,28 +64,28 @@ def drag_and_pitch(setup, alpha):
 
 @thorough(100)
 @given(launches(), setups(), CONTROLS)
-def test_drag_alone_takes_energy_from_the_path(launch, setup, control):
-    """At every state, to rounding: m V dV/dt - m g dZ/dt is -C_Drag q S V; lift gives nothing."""
+def test_only_drag_takes_energy_from_the_path(launch, setup, control):
+    """At every state, to rounding: m V dV/dt - m g dZ/dt is -C_Drag q S V, without any lift."""
     disc, s = setup.disc, launch.state()
     d = derivative(s, STILL, setup.plant, control)
     parts = [disc.mass * v * a for v, a in zip(s[3:6], d[3:6], strict=True)]
     parts.append(-disc.mass * setup.air.gravity * s.VZ)
     c = math.cos(math.radians(launch.angle_of_attack))
     alpha = math.atan2(math.sin(math.radians(launch.angle_of_attack)), abs(c))
-    assume(abs(c) > 2e-4)  # nearer to alpha = +-90 degrees lift fades
+    assume(abs(c) > 2e-4)  # closer to alpha = +-90 degrees lift fades
     C_D, _ = drag_and_pitch(setup, alpha)
     taken = 0.5 * setup.air.density * launch.speed**3 * disc.area * C_D
-    # The angle itself is rounded, and coefficients change by up to 10 a radian.
+    # The angle is rounded too, and coefficients change by up to 10 per radian.
     tolerance = 200 * EPS * (max(map(abs, parts)) + 10.0 * taken)
     assert abs(math.fsum(parts) + taken) <= tolerance
 
 
 def gain(setup):
-    """Largest power of the moments over that of drag, over all angles of attack; below 1 falls.
+    """Largest ratio of the power of moments to that of drag, over all angles of attack.
 
-    With x = q c / V the steady moment gives C_M x, damping takes |C_Mq| x^2 / 2, drag C_Drag, all
-    times q S V: the sum falls for every x where C_M^2 < 2 |C_Mq| C_Drag. A rolling moment that the
-    spin causes adds its own share alike.
+    Below 1 the energy falls. With x = q c / V the steady moment gives C_M x, damping takes
+    |C_Mq| x^2 / 2 and drag C_Drag, all times q S V: the sum falls for every x if
+    C_M^2 < 2 |C_Mq| C_Drag. A rolling moment due to spin adds its share in the same way.
     """
     disc = setup.disc
     if not disc.C_Mq < 0.0 or not disc.C_Lp < 0.0:
@@ -97,7 +97,7 @@ def gain(setup):
 
 @pytest.mark.parametrize('name', sorted(DISCS))
 @pytest.mark.parametrize('aero', ['table', 'linear'])
-def test_damping_outweighs_the_pitching_moment_of_every_disc_but_the_plate(name, aero):
+def test_damping_outweighs_the_pitching_moment_of_every_disc_except_the_plate(name, aero):
     if not DISCS[name].has(aero):
         pytest.skip('no such coefficients')
     share = gain(Setup(disc=DISCS[name], aero=aero))
@@ -112,9 +112,9 @@ DAMPED = setups(axes=('body',), models=('exact', 'constant_spin')).filter(lambda
 @given(launches(), DAMPED)
 @example(Launch(speed=0.0, spin=1000.0), Setup(disc=DISCS['frisbee_roll_moment']))
 def test_in_still_air_without_control_energy_only_falls(launch, setup):
-    """All of it, rotation too, with moments in body axes, for every disc that has damping."""
-    risen, allowed = rises(launch, resolved(setup, launch), rotation=1.0)
-    assert risen <= allowed
+    """Energy of rotation included, with moments in body axes, for every disc with damping."""
+    rise, allowed = rises(launch, resolved(setup, launch), rotation=1.0)
+    assert rise <= allowed
 
 
 def power(setup, launch):
@@ -133,8 +133,8 @@ def power(setup, launch):
 
 @thorough(100)
 @given(launches(), DAMPED)
-def test_at_every_state_energy_falls_at_once(launch, setup):
-    """The same without any integration; gyroscopic terms cancel to rounding."""
+def test_the_rate_of_change_of_energy_is_negative_at_every_state(launch, setup):
+    """The same without integration; gyroscopic terms cancel to rounding."""
     rate, largest = power(setup, launch)
     assert rate <= 100 * EPS * largest
 
@@ -142,17 +142,17 @@ def test_at_every_state_energy_falls_at_once(launch, setup):
 @pytest.mark.parametrize(
     ('disc', 'axes', 'launch'),
     [
-        # Without damping a plate whose nose comes up as the moment lifts it takes C_M q S c q.
+        # A plate without damping, pitching in the direction of its moment, gains C_M q S c q.
         ('flat_plate', 'body', Launch(angle_of_attack=10.0, pitch_rate=1000.0)),
         ('flat_plate', 'body', Launch(angle_of_attack=-10.0, pitch_rate=-1000.0)),
-        # Wind axes give spin what the damping of roll takes, and roll what that of spin takes.
+        # In wind axes the damping of roll drives the spin, and that of spin the roll.
         ('frisbee', 'wind', Launch(angle_of_attack=45.0, spin=300.0, roll_rate=-100.0)),
     ],
 )
 def test_where_the_model_lets_energy_rise(disc, axes, launch):
-    """Known and told in docs/trust.md: quasi-steady moments do work that no drag pays for."""
+    """As docs/trust.md says: quasi-steady moments do work without a matching drag."""
     setup = Setup(disc=DISCS[disc], moment_axes=axes)
     rate, largest = power(setup, launch)
     assert rate > 0.01 * largest
-    risen, allowed = rises(launch, resolved(setup, launch), rotation=1.0, duration=0.02)
-    assert risen > 100 * allowed
+    rise, allowed = rises(launch, resolved(setup, launch), rotation=1.0, duration=0.02)
+    assert rise > 100 * allowed

@@ -1,4 +1,4 @@
-"""Many flights at once are the flights one by one."""
+"""Many flights at once are equal to the same flights one by one."""
 
 import signal
 import subprocess
@@ -58,16 +58,16 @@ def test_each_flight_is_that_of_fly_to_the_last_bit(disc, model, aero, wind):
     setup = Setup(disc=disc_file.load_disc(disc), model=model, aero=aero, wind=wind, step=STEP)
     control = Control(C_L=0.01, C_M=-0.005, C_N=0.001)
     thrown = launches()
-    found = fly_many(thrown, setup, control=control)
+    landings = fly_many(thrown, setup, control=control)
     for i in range(N):
         expected = one(thrown, i, setup, control=control)
-        assert tuple(found.states[i].tolist()) == expected.end
-        assert (found.time[i], found.apex[i]) == (expected.time, expected.apex)
-        assert found.drift[i] == expected.drift
-        assert found.status[i] == (LANDED if expected.landed else FLYING)
-        position = found.x[i], found.y[i], found.z[i]
+        assert tuple(landings.states[i].tolist()) == expected.end
+        assert (landings.time[i], landings.apex[i]) == (expected.time, expected.apex)
+        assert landings.drift[i] == expected.drift
+        assert landings.status[i] == (LANDED if expected.landed else FLYING)
+        position = landings.x[i], landings.y[i], landings.z[i]
         assert position == tuple(expected.position.tolist())
-        assert found.range[i] == pytest.approx(expected.range, rel=1e-15)
+        assert landings.range[i] == pytest.approx(expected.range, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -81,14 +81,14 @@ def test_each_flight_is_that_of_fly_to_the_last_bit(disc, model, aero, wind):
     ids=['wind axes', 'log profile', 'updraught', 'vacuum'],
 )
 @pytest.mark.parametrize('axes', [DISC_BODY, DISC_AIR])
-def test_side_by_side_is_one_by_one_in_seldom_used_setups(changes, axes):
+def test_simd_flights_are_scalar_flights_in_rarely_used_setups(changes, axes):
     setup = Setup(disc=FRISBEE, step=STEP, **changes)
     control = Control(L=0.002, M=-0.001, N=0.0005, axes=axes)
     assert_same_bits(launches(20, seed=3), setup, control=control)
 
 
 @pytest.mark.parametrize('n', [1, 7, 8, 9, 33])
-def test_any_number_of_flights_fills_the_lanes(n):
+def test_any_number_of_flights_fits_the_simd_width(n):
     assert_same_bits(launches(n, seed=n), Setup(disc=disc_file.load_disc('wraith'), step=STEP))
 
 
@@ -108,42 +108,42 @@ def test_a_release_on_the_ground_downwards_lands_at_once_and_upwards_does_not():
 
 
 def assert_same_bits(thrown, setup, **more):
-    found = fly_many(thrown, setup, **more)
-    for i, state in enumerate(found.states):
+    landings = fly_many(thrown, setup, **more)
+    for i, state in enumerate(landings.states):
         expected = one(thrown, i, setup, **more)
         assert tuple(state.tolist()) == expected.end
-        assert (found.time[i], found.apex[i]) == (expected.time, expected.apex)
-        assert found.status[i] == (LANDED if expected.landed else FLYING)
+        assert (landings.time[i], landings.apex[i]) == (expected.time, expected.apex)
+        assert landings.status[i] == (LANDED if expected.landed else FLYING)
 
 
 def test_seeds_are_those_of_the_gusts():
     thrown = launches(4)
     setups = [Setup(disc=FRISBEE, wind=Wind(turbulence=10.0, seed=s), step=STEP) for s in range(4)]
-    found = fly_many(thrown, setups[0], seeds=[0, 1, 2, 3])
+    landings = fly_many(thrown, setups[0], seeds=[0, 1, 2, 3])
     for i, setup in enumerate(setups):
-        assert tuple(found.states[i].tolist()) == one(thrown, i, setup).end
+        assert tuple(landings.states[i].tolist()) == one(thrown, i, setup).end
 
 
 def test_a_flight_that_outlasts_the_first_gusts_goes_on_in_the_same_ones():
     setup = Setup(disc=FRISBEE, wind=Wind(turbulence=5.0, seed=2), step=STEP)
     thrown = {'height': np.array([0.0, 400.0])}
-    found = fly_many(thrown, setup)
-    assert found.time[1] > 12.0
+    landings = fly_many(thrown, setup)
+    assert landings.time[1] > 12.0
     for i, height in enumerate(thrown['height']):
-        assert tuple(found.states[i].tolist()) == fly(Launch(height=float(height)), setup).end
+        assert tuple(landings.states[i].tolist()) == fly(Launch(height=float(height)), setup).end
 
 
 @pytest.mark.parametrize('threads', [1, 2, 5])
 def test_results_do_not_depend_on_threads_or_neighbours(threads):
     thrown = launches(1000)
     setup = Setup(disc=FRISBEE, step=STEP)
-    found = fly_many(thrown, setup, threads=threads)
+    landings = fly_many(thrown, setup, threads=threads)
     last = fly_many({name: x[700:] for name, x in thrown.items()}, setup, threads=1)
-    np.testing.assert_array_equal(found.states[700:], last.states)
+    np.testing.assert_array_equal(landings.states[700:], last.states)
 
 
 def changed(name: str, value: float) -> Setup:
-    """The setup in which one constant has another value, made without an ensemble."""
+    """A setup with another value of one constant, made without an ensemble."""
     document = disc_file.disc_document(FRISBEE)
     keys = {
         'mass': ('mass_kg',),
@@ -187,13 +187,13 @@ def changed(name: str, value: float) -> Setup:
         ('wind_z', -1.0),
     ],
 )
-def test_what_differs_from_flight_to_flight_is_that_constant(name, value):
+def test_a_constant_that_differs_between_flights_acts_as_in_a_setup(name, value):
     setup = Setup(disc=FRISBEE, step=STEP)
     default = ensemble._defaults(setup, Control())[name]
-    found = fly_many({name: [default, value]}, setup)
+    landings = fly_many({name: [default, value]}, setup)
     plain, other = fly(Launch(), setup).end, fly(Launch(), changed(name, value)).end
-    assert tuple(found.states[0].tolist()) == plain
-    assert tuple(found.states[1].tolist()) == other
+    assert tuple(landings.states[0].tolist()) == plain
+    assert tuple(landings.states[1].tolist()) == other
     assert other != plain
 
 
@@ -215,25 +215,25 @@ def test_factors_and_offsets_change_the_coefficients(disc, which):
         Launch(), Setup(disc=disc_file.disc_from_document('changed', document), step=STEP)
     )
     setup = Setup(disc=disc_file.load_disc(disc), step=STEP)
-    found = fly_many({f'{which}_factor': 1.1, f'{which}_offset': 0.01}, setup)
+    landings = fly_many({f'{which}_factor': 1.1, f'{which}_offset': 0.01}, setup)
     # The products are rounded in another order.
-    np.testing.assert_allclose(found.states[0, :3], expected.end[:3], rtol=0.0, atol=1e-10)
-    assert abs(found.x[0] - fly(Launch(), setup).end.X) > 0.01
+    np.testing.assert_allclose(landings.states[0, :3], expected.end[:3], rtol=0.0, atol=1e-10)
+    assert abs(landings.x[0] - fly(Launch(), setup).end.X) > 0.01
 
 
-def test_a_flight_that_a_step_cannot_follow_is_marked_and_the_others_go_on():
+def test_a_flight_that_the_step_cannot_follow_is_marked_and_the_others_continue():
     # A strong control moment spins the disc up.
     setup = Setup(disc=FRISBEE, step=STEP)
     thrown = {'control_CN': [0.0, 10.0], 'speed': [15.0, 40.0], 'height': [0.0, 2000.0]}
-    found = fly_many(thrown, setup)
-    assert found.status.tolist() == [LANDED, LOST]
-    assert np.isfinite(found.states).all()
+    landings = fly_many(thrown, setup)
+    assert landings.status.tolist() == [LANDED, LOST]
+    assert np.isfinite(landings.states).all()
 
 
-def test_what_is_not_named_is_the_default_and_one_flight_needs_no_array():
-    found = fly_many({}, Setup(disc=FRISBEE))
-    assert found.states.shape == (1, 14)
-    assert tuple(found.states[0].tolist()) == fly(Launch(), Setup(disc=FRISBEE)).end
+def test_quantities_have_defaults_and_one_flight_needs_no_array():
+    landings = fly_many({}, Setup(disc=FRISBEE))
+    assert landings.states.shape == (1, 14)
+    assert tuple(landings.states[0].tolist()) == fly(Launch(), Setup(disc=FRISBEE)).end
 
 
 @pytest.mark.parametrize(
@@ -256,17 +256,17 @@ def test_bad_input_names_the_flight(thrown, says):
         fly_many(thrown, Setup(disc=FRISBEE, step=STEP))
 
 
-def test_one_wild_flight_is_refused_for_itself_and_not_for_another():
-    """The rate of damping is in proportion to the airspeed: only in fast flight it is too much."""
+def test_a_step_is_checked_against_each_flight_alone():
+    """The rate of damping is proportional to the airspeed: only the fast flight is refused."""
     setup = Setup(disc=FRISBEE, step=0.02)
     thrown = {'C_Lp': [-0.6, -10.0], 'speed': [20.0, 1.0]}
-    found = fly_many(thrown, setup)
-    assert found.status.tolist() == [LANDED, LANDED]
+    landings = fly_many(thrown, setup)
+    assert landings.status.tolist() == [LANDED, LANDED]
     with pytest.raises(ConfigError, match='flight 1'):
         fly_many({'C_Lp': [-0.6, -10.0], 'speed': [1.0, 20.0]}, setup)
 
 
-def test_an_interrupt_stops_it_soon():
+def test_an_interrupt_stops_an_ensemble_soon():
     program = (
         'from disc_sim_ros.physics import disc_file\n'
         'from disc_sim_ros.physics.ensemble import fly_many\n'
@@ -280,9 +280,9 @@ def test_an_interrupt_stops_it_soon():
         [sys.executable, '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as flown:
         assert flown.stdout.readline() == 'ready\n'
-        time.sleep(0.5)  # into the flights, which take minutes
+        time.sleep(0.5)  # during the flights, which take minutes
         flown.send_signal(signal.SIGINT)
-        # A chunk is 0.1 s or so of one core; the rest is for a busy machine.
+        # A chunk takes about 0.1 s of one core; the rest is for a busy machine.
         _, errors = flown.communicate(timeout=60.0)
     assert 'KeyboardInterrupt' in errors
 

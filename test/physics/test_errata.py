@@ -1,6 +1,6 @@
-"""What the paper prints and what works: each erratum, and each choice made where it says nothing.
+"""Each erratum of the paper, and each choice where the paper gives no value.
 
-docs/deviations.md names these tests. "Printed" functions hold the equations letter by letter.
+docs/deviations.md names these tests. "Printed" functions are the equations exactly as printed.
 """
 
 import dataclasses
@@ -126,13 +126,13 @@ def test_eqn_2_is_no_rotation(angles):
     printed = printed_eqn_2(*angles)
     assert np.abs(printed @ printed.T - EYE).max() > 0.1
     phi, theta, psi = angles
-    mended = printed.copy()
-    mended[0, 0] = math.cos(theta) * math.cos(psi)
-    mended[1, 0] *= -1
-    mended[1, 1] -= 2 * math.sin(phi) * math.sin(theta) * math.sin(psi)
+    corrected = printed.copy()
+    corrected[0, 0] = math.cos(theta) * math.cos(psi)
+    corrected[1, 0] *= -1
+    corrected[1, 1] -= 2 * math.sin(phi) * math.sin(theta) * math.sin(psi)
     one_two_three = (about_x(phi) @ about_y(theta) @ about_z(psi)).T  # eqn 1
-    assert_allclose(mended, one_two_three, atol=EXACT_ROUNDING)
-    # A rotation, but roll first; the text and Fig. 1 put yaw first, and so does the package.
+    assert_allclose(corrected, one_two_three, atol=EXACT_ROUNDING)
+    # A rotation, but with roll first; the text, Fig. 1 and the package have yaw first.
     package = frames.rotation_matrix(frames.quaternion_from_euler(*np.degrees(angles))).T
     assert_allclose(package, T_12(*angles), atol=EXACT_ROUNDING)
     assert_allclose(package @ package.T, EYE, atol=EXACT_ROUNDING)
@@ -170,7 +170,7 @@ def test_eqn_5_is_not_the_transpose(angles):
 
 @pytest.mark.parametrize('angles', ATTITUDES)
 def test_eqn_6_against_finite_differences(angles):
-    """The angular velocity of R(t) for angles that change evenly, from R^T dR/dt."""
+    """The angular velocity of R(t) for angles that change linearly, from R^T dR/dt."""
     euler_rates = np.array([0.8, -0.5, 1.1])
     h = 1e-5
 
@@ -184,12 +184,12 @@ def test_eqn_6_against_finite_differences(angles):
     assert_allclose(rates_from_euler_rates(*angles[:2]) @ euler_rates, pqr, atol=tolerance)
     printed = printed_eqn_6(*angles)
     assert np.abs(printed @ pqr - euler_rates).max() > 0.1  # as eqn 6 introduces it
-    assert np.abs(printed @ euler_rates - pqr).max() > 0.1  # and the other way, for psi
+    assert np.abs(printed @ euler_rates - pqr).max() > 0.1  # and in the other direction, for psi
 
 
 @pytest.mark.parametrize('angles', ATTITUDES)
 def test_quaternion_rate_against_euler_rates(angles):
-    """The package's rate of the despun axes, at (p, q, 0), through the mended eqn 6."""
+    """The package's rate of the despun axes, at (p, q, 0), through the corrected eqn 6."""
     pqr = (3.0, -2.0, 40.0)
     disc = FRISBEE
     s = state((10.0, 1.0, 2.0), pqr, angles)
@@ -201,7 +201,7 @@ def test_quaternion_rate_against_euler_rates(angles):
     expected = np.linalg.solve(rates_from_euler_rates(*angles[:2]), [pqr[0], pqr[1], 0.0])
     # h^2 w^3 / 6 is 1e-10 at rates up to 8 rad/s, rounding 1e-16 / h is 1e-10.
     assert_allclose((after - before) / (2 * h), expected, atol=1e-8)
-    assert rate.sigma == pqr[2]  # the spin is counted beside them
+    assert rate.sigma == pqr[2]  # the spin angle is a state of its own
 
 
 # Forces and moments ----------------------------------------------------------------------------
@@ -227,19 +227,19 @@ def printed_eqns_35_to_37(alpha, beta, phi, theta, weight):
 
 @pytest.mark.parametrize(('alpha', 'beta'), FLOWS)
 def test_eqns_35_to_37_repeat_faults(alpha, beta):
-    """Only the sign of C_Side in eqn 36 is a misprint of its own."""
+    """They repeat eqns 2 and 4; only the sign of C_Side in eqn 36 is a new misprint."""
     phi, theta, psi = ATTITUDES[0]
     F_4 = (-C.Drag, C.Side, -C.Lift)
     air = T_23(beta).T @ printed_eqn_4(alpha).T @ F_4  # eqn 31
     gravity = printed_eqn_2(phi, theta, psi).T @ (0, 0, 2.0)  # eqn 33
     printed = printed_eqns_35_to_37(alpha, beta, phi, theta, 2.0)
-    own_fault = (0.0, 2 * C.Side * math.cos(beta), 0.0)
-    assert_allclose(printed + own_fault, air + gravity, atol=EXACT_ROUNDING)
+    new_misprint = (0.0, 2 * C.Side * math.cos(beta), 0.0)
+    assert_allclose(printed + new_misprint, air + gravity, atol=EXACT_ROUNDING)
 
 
 @pytest.mark.parametrize(('alpha', 'beta'), FLOWS)
 def test_lift_does_no_work(alpha, beta):
-    """Eqn 31 with the mended matrices is the package's force; eqns 35 to 37 are none."""
+    """Eqn 31 with the corrected matrices is the package's force; eqns 35 to 37 are not."""
     speed = 11.0
     uvw = np.array(uvw_of(speed, alpha, beta))
     plant = Setup(disc=FRISBEE).plant
@@ -254,7 +254,10 @@ def test_lift_does_no_work(alpha, beta):
 
 
 def test_gravity_points_down():
-    """Nose up, it pulls back (-x); right edge down, to the right (+y). Eqns 33, 35 and 36 not."""
+    """Nose up, gravity pulls back (-x); right edge down, to the right (+y).
+
+    Eqns 33, 35 and 36 have the opposite signs.
+    """
     phi, theta = 0.5, 0.3
     down = T_12(phi, theta, 0.8) @ (0, 0, 1)
     assert (np.sign(down) == (-1, 1, 1)).all()
@@ -268,7 +271,7 @@ def test_gravity_points_down():
         ground=False,
         sample_rate=1.0,
     )
-    # A second of free fall; the attitude stays.
+    # One second of free fall; the attitude is constant.
     assert_allclose(flight.trajectory.air_velocity[-1], 9.81 * down, rtol=1e-12)
 
 
@@ -310,7 +313,7 @@ def test_moments_act_in_axes_3_or_4(alpha, beta, moment_axes):
 @pytest.mark.parametrize('spin', [40.0, -60.0])
 @pytest.mark.parametrize(('roll', 'pitch'), [(0.0, 0.01), (0.01, 0.0), (0.004, -0.02)])
 def test_eqns_53_and_54(roll, pitch, spin):
-    """Eqn 11 as printed, in axes that spin, for a moment that does not: ten nutations of it."""
+    """Eqn 11 as printed, in axes that spin, for a moment that does not, over ten nutations."""
     I_z, I_x = FRISBEE.inertia_axial, FRISBEE.inertia_diametral
     inertia = np.array([I_x, I_x, I_z])
 
@@ -328,12 +331,12 @@ def test_eqns_53_and_54(roll, pitch, spin):
         theory.precession_roll_rate(pitch, spin, I_z),
         theory.precession_pitch_rate(roll, spin, I_z),
     )
-    # From rest the rates are a cycloid, whose mean over whole nutations is exact: the error is
+    # From rest the axis draws a cycloid, and its mean over whole nutations is exact. The error is
     # that of the integration, some 1e-8 of the amplitude, 0.2 rad/s.
     assert_allclose((p, q), expected, atol=1e-7)
     assert_allclose(2 * pitch / (spin * I_z), -2 * p, atol=2e-7)  # eqn 54 as printed
     assert_allclose(2 * roll / (spin * I_z), 2 * q, atol=2e-7)  # eqn 53 as printed
-    # Eqn 52 with dp/dt = dq/dt = 0 in the axes that spin: not even that gives the printed sign.
+    # Eqn 52 with dp/dt = dq/dt = 0 in axes that spin does not give the printed sign either.
     assert_allclose(pitch / (spin * (I_x - I_z)), 2 * p, atol=2e-7)
 
 
@@ -369,9 +372,9 @@ def test_eqns_57_61_and_64(ratio):
 
     exact = plate_flight(ratio, 'exact', 1)
     p_hat = theory.dimensionless_roll_rate(exact.rates[:-1, 0].mean(), 15.7, 9.81)
-    # The moment grows with the nose-up angle of the first nutation, relative to itself by the
-    # moment's slope times I_x / (r I_z)^2, 3.7 % at AdvR 1. Lift, which turns the path meanwhile,
-    # and the second order are less than that again: half of it to twice.
+    # The moment grows with the nose-up angle of the first nutation, by its slope times
+    # I_x / (r I_z)^2, 3.7 % at AdvR 1. Lift, which turns the path, and terms of second order are
+    # smaller: half to twice this growth is allowed.
     slope = 0.5 * 1.225 * 15.7**2 * plate.area * plate.diameter * plate.linear.CM_alpha
     momentum = theory.spin_rate(ratio, plate.diameter, 15.7) * plate.inertia_axial
     growth = slope * plate.inertia_diametral / momentum**2
@@ -381,12 +384,12 @@ def test_eqns_57_61_and_64(ratio):
 
 @pytest.mark.parametrize('model', MODELS)
 def test_constant_spin_keeps_the_wobble(model):
-    """Eqns 47 to 49 are said to have no wobble. In vacuum nothing damps it: p + i q turns on."""
+    """The paper says that eqns 47 to 49 have no wobble. In vacuum it continues undamped."""
     launch = Launch(speed=0.0, pitch=0.0, roll_rate=5.0)
     setup = Setup(disc=FRISBEE, air=NO_GRAVITY, model=model)
     t = fly(launch, setup, duration=1.0, ground=False, sample_rate=100.0).trajectory
     wobble = np.hypot(t.rates[:, 0], t.rates[:, 1])
-    # RK4 loses (h w)^6 / 144 a step, w = 63 rad/s: 4e-10, 4e-7 in 1000 steps.
+    # RK4 damps by (h w)^6 / 144 per step, w = 63 rad/s: 4e-10, 4e-7 in 1000 steps.
     assert_allclose(wobble, 0.0 if model == 'precession' else 5.0, rtol=1e-6, atol=0.0)
 
 
@@ -419,7 +422,7 @@ def fig5_flight(share=1.0, spin_damping=FRISBEE.C_Nr, disc=FRISBEE, rate=5.0, **
 
 
 def quantities(t):
-    """What Fig. 5 plots, angles in degrees."""
+    """The quantities of Fig. 5, angles in degrees."""
     phi, theta, _ = np.degrees(t.euler).T
     alpha, lambda_ = np.degrees(t.alpha), np.degrees(t.absolute_attitude)
     return {'V': t.airspeed, 'alpha': alpha, 'lambda': lambda_, 'phi': phi, 'theta': theta}
@@ -437,11 +440,11 @@ def rms_to_fig5(t, first=1, suffix=''):
 @pytest.mark.parametrize(
     ('share', 'spin_damping', 'first', 'expected'),
     [
-        # Constant spin, every row read off: two digits, from an integration made before this one.
+        # Constant spin, all digitised rows: two digits, from an earlier independent integration.
         (1.0, 0.0, 0, (0.20, 1.81, 1.12)),
         (0.1, 0.0, 0, (0.10, 0.57, 0.24)),
         (0.01, 0.0, 0, (0.10, 0.42, 0.21)),
-        # 3 % of spin lost in 4 s, without the poor first row.
+        # 3 % of the spin lost in 4 s, without the poorly digitised first row.
         (1.0, FRISBEE.C_Nr, 1, (0.178, 1.727, 1.162)),
         (0.1, FRISBEE.C_Nr, 1, (0.046, 0.607, 0.385)),
         (0.01, FRISBEE.C_Nr, 1, (0.051, 0.614, 0.482)),
@@ -474,7 +477,7 @@ def test_fig_5_plots_despun_angles():
     assert (rms['phi'], rms['theta']) == pytest.approx((0.53, 0.37), abs=0.005)
     spinning = frames.rotation_matrix(t.attitude) @ [about_z(sigma) for sigma in t.spin_angle]
     theta = np.degrees(np.arcsin(-spinning[:, 2, 0]))
-    # Axes that spin swing through pitches of plus and minus lambda: wrong by tens of degrees.
+    # In axes that spin the pitch swings between plus and minus lambda: tens of degrees off.
     assert np.sqrt(np.mean((theta - fig5_read()['theta']) ** 2)) > 10.0
 
 
@@ -484,8 +487,8 @@ def test_fig_5_has_constant_spin():
     read = fig5_read()[1:]
     spin = 2 * read['V'] * read['AdvR'] / FRISBEE.diameter
     slope = np.polyfit(read['t_s'], spin, 1)[0]
-    assert abs(slope) < 0.5 * 0.03 * 31.416 / 4.0  # nearer to no loss than to 3 %
-    # The level, 29.9 rad/s, is 5 % below the 5 rev/s of the text, at every time: not explained.
+    assert abs(slope) < 0.5 * 0.03 * 31.416 / 4.0  # closer to no loss than to 3 %
+    # The mean, 29.9 rad/s, is 5 % below the 5 rev/s of the text at all times; unexplained.
     assert spin.mean() == pytest.approx(29.9, abs=0.05)
 
 
@@ -495,11 +498,11 @@ def test_fig_5_has_constant_spin():
     [((-0.01, 0.057), 3.5, 25.4), ((-0.023, 0.38), -38.7, 3.0)],
 )
 def test_grey_curves_of_fig_5(moment_line, phi_end, rms_phi):
-    """They end at a roll of -38 degrees; so does a moment line that is nowhere printed."""
+    """They end at a roll of -38 degrees, as with a moment line that the paper does not print."""
     line = dataclasses.replace(FRISBEE.linear, CM_0=moment_line[0], CM_alpha=moment_line[1])
     disc = dataclasses.replace(FRISBEE, linear=line)
     t = fig5_flight(disc=disc, aero='linear')
-    # Half a digit of what docs/deviations.md quotes.
+    # Half the last digit of docs/deviations.md.
     assert quantities(t)['phi'][-1] == pytest.approx(phi_end, abs=0.05)
     assert rms_to_fig5(t, suffix='_lin')['phi'] == pytest.approx(rms_phi, abs=0.05)
     near = abs(phi_end - fig5_read()['phi_lin'][-1]) < READING_ERROR['phi']
@@ -531,9 +534,9 @@ def test_axes_4_drive_the_spin():
     qSc = 0.5 * 1.225 * t.airspeed**2 * FRISBEE.area * FRISBEE.diameter
     gain = np.trapezoid(qSc * C_L * np.sin(t.alpha), t.t) / FRISBEE.inertia_axial / t.spin[0]
     simulated = fig5_flight(spin_damping=0.0, moment_axes='wind').spin
-    # The flight itself follows the spin: a second-order change, 4 % of 4 %, and the quadrature's.
+    # The flight changes with the spin to second order, 4 % of 4 %, plus the quadrature error.
     assert simulated[-1] / simulated[0] - 1 == pytest.approx(gain, abs=2e-3)
-    # Eqn 40 prints -C_L sin alpha: the same amount lost.
+    # Eqn 40 prints -C_L sin alpha, which would lose the same amount.
     assert -100 * gain == pytest.approx(-4.1, abs=0.1)
 
 
@@ -561,7 +564,7 @@ def test_moment_axes_hardly_move_the_path(model):
 
 
 # Hummel's flight f2302 (thesis, 2003, Table 3-3): velocity in earth axes, angles of the sequence
-# 1-2-3 and their rates, as her program has them. Fig. 4 prints what comes after.
+# 1-2-3 and their rates, as in her program. Fig. 4 prints their transformation to body axes.
 F2302_VELOCITY = (13.42, -0.41, 0.001)
 F2302_ANGLES = (-0.07, 0.21, 5.03)
 F2302_ANGLE_RATES = (-14.94, -1.48, 54.25)
@@ -576,7 +579,7 @@ def rates_of_sequence_123():
 
 @pytest.mark.paper
 def test_launch_of_fig_4():
-    """The paper's program had the right matrices, then: eqns 2 and 6 are misprints."""
+    """The paper's program had the right matrices: eqns 2 and 6 are misprints."""
     # Angles are given to 0.005 rad about each of three axes: 0.12 m/s of 13.4, 0.5 rad/s of 54.
     to_velocity = {'atol': 0.005 * math.sqrt(3) * 13.42}
     to_rates = {'atol': 0.005 * math.sqrt(3) * 54.25}
@@ -594,7 +597,7 @@ def test_launch_of_fig_4():
     assert_allclose(uvw, (4.49, 12.34, 2.78), **to_velocity)
     assert np.linalg.norm(uvw) == pytest.approx(np.linalg.norm(printed_uvw), abs=0.01)
     p, q, r = rates_of_sequence_123()
-    # Half the last digit of docs/deviations.md, from the angles as they are.
+    # Half the last digit of docs/deviations.md, from the angles as given.
     assert (math.hypot(p, q), r) == pytest.approx((14.69, 51.14), abs=0.005)
     assert math.hypot(*printed_pqr[:2]) == pytest.approx(26.76, abs=0.005)
     angles = [math.degrees(math.asin(w / 13.42)) for w in (uvw[2], printed_uvw[2])]
@@ -610,7 +613,7 @@ def test_lift_is_weight_in_fig_10():
     needed = theory.lift_for_weight(0.015, 9.81, 0.5 * 1.225 * 15.7**2, printed.area)
     assert needed == pytest.approx(0.345, abs=0.0005)
     assert plate.linear.CL_alpha * math.radians(2.0) == pytest.approx(0.0859, abs=0.00005)
-    # The printed I_z, 6.7e-6, is eqn 60 with that radius for c: cut off, not rounded.
+    # The printed I_z, 6.7e-6, is eqn 60 with the radius for c, truncated instead of rounded.
     assert theory.uniform_inertia(0.015, 0.06) == pytest.approx(6.7e-6, abs=0.1e-6)
     assert theory.uniform_inertia(plate.mass, plate.diameter) == pytest.approx(2.7e-5, rel=1e-12)
     assert plate.inertia_axial == 2.7e-5
@@ -621,14 +624,14 @@ def test_lift_is_weight_in_fig_10():
     (0.0, 1.0, 12.2), (0.0, 0.1, 11.7), (9.81, 1.0, 43.9), (9.81, 0.1, 51.4),
 ])  # fmt: skip
 def test_fig_12_has_no_gravity(gravity, share, depth):
-    """The figure ends about 12 m down; the text has a straight path while the disc slows down."""
+    """The figure ends about 12 m down; the text describes a straight path at falling speed."""
     spin = theory.spin_rate(0.34, FRISBEE.diameter, 19.0)
     launch = Launch(speed=19.0, pitch=-20.0, angle_of_attack=-3.0, spin=spin)
     disc = dataclasses.replace(FRISBEE, C_Lp=share * FRISBEE.C_Lp, C_Mq=share * FRISBEE.C_Mq)
     setup = Setup(disc=disc, air=Air(gravity=gravity))
     end = fly(launch, setup, control=Control(C_M=0.2), duration=4.0, ground=False).end
     assert abs(end.Z - depth) < 0.05  # half the last digit
-    assert (abs(end.Z - 12.0) < 0.5) == (gravity == 0.0)  # half a metre of "about 12 m"
+    assert (abs(end.Z - 12.0) < 0.5) == (gravity == 0.0)  # "about 12 m", to half a metre
 
 
 # Choices ---------------------------------------------------------------------------------------
@@ -637,9 +640,9 @@ def test_fig_12_has_no_gravity(gravity, share, depth):
 @pytest.mark.paper
 @pytest.mark.parametrize(('slope', 'printed'), [(-1.44e-2, -1.40), (-1.25e-2, -1.30)])
 def test_printed_damping_is_per_c_over_2_v(slope, printed):
-    """Her estimates of f2302 are per rad/s; she took d = 2 sqrt(A / pi) with A = 0.057 m^2."""
+    """Hummel's estimates of f2302 are per rad/s, with d = 2 sqrt(A / pi) and A = 0.057 m^2."""
     diameter = 2 * math.sqrt(0.057 / math.pi)
-    # At the release speed. Per c / V they would be half; the speed used is not known to 5 %.
+    # At the release speed. Per c / V they would be half; her speed is known to 5 % only.
     assert slope * 2 * 13.42 / diameter == pytest.approx(printed, rel=0.05)
 
 
@@ -648,7 +651,7 @@ def test_how_fast_a_wobble_dies(share, lowest, highest):
     """Per second, in the first 0.1 s of the throw of Fig. 5 released with p = 5 rad/s.
 
     At the printed damping it is -rho V S c^2 (C_Lp + C_Mq) / (8 I_x), for V falling from 15.0 to
-    14.1 m/s; at a tenth of it lift and moment matter as much, and only 1 to 4 is asked for.
+    14.1 m/s. At a tenth of it lift and moment matter as much: only 1 to 4 is required.
     """
     disc = dataclasses.replace(FRISBEE, C_Lp=share * FRISBEE.C_Lp, C_Mq=share * FRISBEE.C_Mq)
     wobbling, still = (
@@ -663,7 +666,7 @@ def test_how_fast_a_wobble_dies(share, lowest, highest):
 @pytest.mark.parametrize('alpha', [90.0, -90.0])
 @pytest.mark.parametrize('spin', [0.0, 31.4])
 def test_no_direction_no_push(alpha, spin):
-    """The raw table has a little lift at +-90 degrees; the disc falls straight all the same."""
+    """The raw table has a little lift at +-90 degrees; the disc falls straight nevertheless."""
     launch = Launch(speed=10.0, pitch=0.0, angle_of_attack=alpha, spin=spin)
     end = fly(launch, Setup(disc=FRISBEE), duration=2.0, ground=False).end
     assert (end.X, end.Y, end.p, end.q) == (0.0, 0.0, 0.0, 0.0)
@@ -672,13 +675,13 @@ def test_no_direction_no_push(alpha, spin):
     a = flow(s, STILL)
     at_90 = coefficients(a, s.r, plant)
     assert at_90.Lift == pytest.approx(-0.0038 if alpha > 0 else -0.0037, abs=0.00005)
-    # Nor does a flow of rounding size: 1e-9 of the airspeed is 1e-5 of a direction.
+    # An in-plane flow of rounding size, 1e-9 of the airspeed, counts as 1e-5 of a direction.
     hint = flow(state((1e-8, 0.0, 10.0 if alpha > 0 else -10.0)), STILL)
     qS = 0.5 * plant.rho * 10.0**2 * plant.S
     assert abs(force(hint, at_90, plant)[0]) < 1.1e-5 * abs(at_90.Lift) * qS
     m = moment(a, s, at_90, plant, Control(C_L=0.1, C_M=-0.2))
     qSc = 0.5 * plant.rho * 10.0**2 * plant.S * plant.c
-    # Only the commands act, about the disc's own axes, and damping has no direction.
+    # Only control inputs act, about the disc's own axes, and damping has no direction.
     assert_allclose((m.L, m.M), (0.1 * qSc, -0.2 * qSc), rtol=1e-12)
     assert m.D_xy == 0.0
     assert m.D_xx == m.D_yy

@@ -1,4 +1,4 @@
-"""Flights whose answer is known in closed form, and quantities that nothing may change."""
+"""Flights with a solution in closed form, and conserved quantities."""
 
 import dataclasses
 import math
@@ -42,13 +42,14 @@ def test_torque_free_disc_nutates_at_the_analytic_rate(spin, ratio):
     phase = spin / ratio * t.t
     start = complex(launch.roll_rate, launch.pitch_rate)
     expected = start * np.exp(1j * phase)
-    # RK4 loses (h w)^5 / 120 of phase a step: at w = 120 rad/s and 1 ms 2e-7, 2e-4 after 1000.
+    # The phase error of RK4 is (h w)^5 / 120 per step: 2e-7 at w = 120 rad/s and 1 ms, 2e-4 in
+    # 1000 steps.
     assert_allclose(t.rates[:, 0] + 1j * t.rates[:, 1], expected, atol=2e-4 * abs(start) * 1.2)
     assert_allclose(t.spin, spin, rtol=0.0, atol=0.0)
 
 
 @pytest.mark.parametrize('model', ['exact', 'constant_spin'])
-def test_vacuum_keeps_energy_and_angular_momentum(model):
+def test_energy_and_angular_momentum_are_conserved_in_vacuum(model):
     t = free(WOBBLING, Setup(disc=FRISBEE, air=VACUUM, model=model), 2.0)
     H = angular_momentum(t, FRISBEE)
     # As above, the phase error of nutation tilts H by at most 4e-4 of its transverse part, 0.04.
@@ -58,13 +59,13 @@ def test_vacuum_keeps_energy_and_angular_momentum(model):
     energy = kinetic + FRISBEE.mass * 9.81 * height
     # The trajectory is a parabola, which RK4 integrates exactly: rounding only.
     assert_allclose(energy, energy[0], rtol=1e-12)
-    # Rotation loses amplitude at (h w)^6 / 144 a step, 2e-8 at most: 4e-5 of the wobble's part.
+    # RK4 damps the rotation by (h w)^6 / 144 per step, at most 2e-8: 4e-5 of the wobble's energy.
     I_x, I_z = FRISBEE.inertia_diametral, FRISBEE.inertia_axial
     rotation = 0.5 * (t.rates**2) @ (I_x, I_x, I_z)
     assert_allclose(rotation, rotation[0], rtol=1e-6)
 
 
-def test_vacuum_flight_is_a_parabola_whatever_the_disc_does():
+def test_a_flight_in_vacuum_is_a_parabola_in_every_rotation():
     t = free(WOBBLING, Setup(disc=FRISBEE, air=VACUUM), 2.0)
     expected = t.position[0] + t.t[:, None] * t.velocity[0]
     expected[:, 2] += 0.5 * 9.81 * t.t**2
@@ -120,8 +121,8 @@ def test_gyroscopic_precession(spin, damping):
     complex_D = qSc * damping * disc.diameter / (2 * V) + 1j * spin * disc.inertia_axial
     z_1 = -1j * 0.01 * qSc / complex_D
     expected = z_1 * (1 - np.exp(complex_D / disc.inertia_diametral * t.t))
-    # The disc leaves the flow by up to 0.05 rad of roll in 0.4 s, which turns the axes of the
-    # moment by its square.
+    # In 0.4 s the disc rolls out of the flow by up to 0.05 rad, which turns the axes of the moment
+    # by the square of that.
     assert_allclose(t.rates[:, 0] + 1j * t.rates[:, 1], expected, atol=2.5e-3 * abs(z_1))
     if damping == 0.0:
         assert z_1.real == pytest.approx(-0.01 * qSc / (spin * disc.inertia_axial), rel=1e-12)
@@ -132,9 +133,10 @@ def test_gyroscopic_precession(spin, damping):
     [(Control(M=0.01), 0.0, -1.0), (Control(L=0.01), 1.0, 0.0), (Control(M=-0.01), 0.0, 1.0)],
 )
 def test_a_moment_precesses_the_mean_attitude(moment, pitch, roll):
-    """In vacuum from rest the wobble never dies; over whole nutations its mean is the precession.
+    """In vacuum the wobble is not damped; its mean over whole nutations is the precession.
 
-    From p = q = 0 the tip of the axis draws a cycloid: mean rate M / (r I_z), no mean across.
+    From p = q = 0 the tip of the axis draws a cycloid: its mean rate is M / (r I_z), with no mean
+    in the other direction.
     """
     spin = 100.0
     launch = Launch(speed=0.0, pitch=0.0, spin=spin)
@@ -145,7 +147,7 @@ def test_a_moment_precesses_the_mean_attitude(moment, pitch, roll):
     phi, theta, _ = frames.euler_from_quaternion([flight.end[6:10]])[0]
     rate = 0.01 / (spin * FRISBEE.inertia_axial)
     angle = rate * duration
-    # The axis turns by 2.6 rad/s / 0.6 s = 0.03 rad: angles add but for third order, 1e-5.
+    # The axis turns by 0.03 rad: angles add up to terms of third order, 1e-5.
     assert_allclose([theta, phi], [pitch * angle, roll * angle], atol=2e-5)
 
 
@@ -168,7 +170,7 @@ def test_a_moment_fixed_in_the_plastic_turns_with_the_spin():
     nutation = spin * FRISBEE.inertia_axial / FRISBEE.inertia_diametral
     forced = L / FRISBEE.inertia_diametral / (1j * (spin - nutation))
     expected = forced * (np.exp(1j * spin * t.t) - np.exp(1j * nutation * t.t))
-    # (h w)^4 / 120 relative a step of phase, w h = 0.016: 3e-8 over 5000 steps of 0.016 rad.
+    # Relative phase error (h w)^4 / 120 per step, h w = 0.016: 3e-8 over 5000 steps of 0.016 rad.
     assert_allclose(t.rates[:, 0] + 1j * t.rates[:, 1], expected, atol=1e-6 * abs(forced))
 
 
@@ -184,5 +186,5 @@ def test_moment_in_air_axes_is_a_moment_in_disc_axes_while_the_flow_is_along_x()
     end = fly(
         turned, setup, duration=0.05, ground=False, control=Control(L=0.001, axes=DISC_AIR)
     ).end
-    # The flow from the right makes x3 the disc's y: the same moment now pitches.
+    # With sideslip 90 degrees x3 is the disc's y: the same moment now pitches.
     assert_allclose([end.p, end.q], [-ends[1].q, ends[1].p], rtol=1e-3)

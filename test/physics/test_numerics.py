@@ -1,4 +1,4 @@
-"""The integration: its order, its landing, its samples, compiled and plain."""
+"""The integration: its order, its landing and its samples."""
 
 import dataclasses
 
@@ -28,10 +28,10 @@ STILL = Velocity(0.0, 0.0, 0.0)
     ('model', 'coarsest'), [('exact', 1024), ('constant_spin', 1024), ('precession', 64)]
 )
 def test_order_four(model, coarsest):
-    """Errors of halved steps against a far finer one, on smooth (linear) aerodynamics.
+    """Errors of halved steps against a far finer step, with smooth (linear) aerodynamics.
 
-    Nutation, 100 rad/s here, has to be resolved before errors fall by a law; without it the steps
-    have to be long for errors to stand above rounding.
+    Errors follow the order once the steps resolve the nutation, here at 100 rad/s. Without
+    nutation the steps must be long, so that errors are above rounding.
     """
     setup = Setup(disc=FRISBEE, aero='linear', model=model, wind=Wind(mean=(1.0, 2.0, 0.0)))
 
@@ -42,11 +42,11 @@ def test_order_four(model, coarsest):
     exact = end(16 * coarsest)
     errors = [np.linalg.norm(end(n * coarsest) - exact) for n in (1, 2, 4)]
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(4.0, abs=0.2)
-    assert errors[-1] > 1e-13  # above rounding, or the law would be none
+    assert errors[-1] > 1e-13  # above rounding, where an order can be seen
 
 
-def test_the_table_is_followed_across_its_corners():
-    """Corners of the table cost order, not accuracy: 10 ms is good for a tenth of a millimetre."""
+def test_corners_of_the_table_reduce_the_order_but_not_the_accuracy():
+    """A step of 10 ms is accurate to a tenth of a millimetre."""
     fine = fly(Launch(), Setup(disc=FRISBEE, step=1e-4)).position
     coarse = fly(Launch(), Setup(disc=FRISBEE, step=1e-2)).position
     assert_allclose(coarse, fine, atol=1e-4)
@@ -74,18 +74,18 @@ def test_quaternion_rate_is_the_rate_of_the_attitude(seed):
     omega = np.array([[0, 0, q], [0, 0, -p], [-q, p, 0]])  # eqn 13 with r = 0: despun axes
     # Central difference: (h w)^2 / 6 is 1e-10 relative, rounding 1e-16 / h = 1e-10 absolute.
     assert_allclose(numeric, frames.rotation_matrix(e) @ omega, atol=1e-7)
-    assert abs(e @ e_dot) < 1e-15  # the length of the quaternion stays
+    assert abs(e @ e_dot) < 1e-15  # the length of the quaternion is constant
 
 
 def test_gyroscopic_terms_do_no_work():
-    """In vacuum I omega . omega' is 0: the paper's omega~ I omega is at right angles to omega."""
+    """In vacuum I omega . omega' is 0: the paper's omega~ I omega is perpendicular to omega."""
     setup = Setup(disc=FRISBEE)
     launch = Launch(speed=0.0, spin=50.0, roll_rate=7.0, pitch_rate=-4.0)
     rate = derivative_of(launch, setup, Control())
     I_x = FRISBEE.inertia_diametral
     power = I_x * (7.0 * rate.p - 4.0 * rate.q) + FRISBEE.inertia_axial * 50.0 * rate.r
     assert abs(power) < 1e-15
-    assert abs(rate.p) > 100.0  # the terms are there
+    assert abs(rate.p) > 100.0  # the terms are not zero
 
 
 def test_precession_rates_balance_the_moments():
@@ -109,7 +109,7 @@ def test_landing_is_where_the_trajectory_crosses_the_ground(step):
     assert_allclose(through.end, landed.end, rtol=1e-12, atol=1e-12)
 
 
-def test_a_release_on_the_ground_lands_only_when_it_comes_back():
+def test_a_release_on_the_ground_lands_only_if_it_sinks_or_comes_back():
     setup = Setup(disc=FRISBEE)
     up = fly(Launch(pitch=5.0), setup)
     assert up.time > 0.5
@@ -120,7 +120,7 @@ def test_a_release_on_the_ground_lands_only_when_it_comes_back():
     assert hop.time == pytest.approx(2 * 1e-3 / 9.81, rel=1e-3)
 
 
-def test_samples_are_even_and_change_nothing():
+def test_samples_are_evenly_timed_and_do_not_change_the_flight():
     setup = Setup(disc=FRISBEE, wind=Wind(turbulence=10.0, seed=4))
     bare = fly(WOBBLING, setup)
     flight = fly(WOBBLING, setup, sample_rate=333.0)
@@ -129,7 +129,7 @@ def test_samples_are_even_and_change_nothing():
     t = flight.trajectory
     assert np.array_equal(t.t, np.arange(len(t)) / 333.0)
     assert flight.time - t.t[-1] < 1 / 333.0
-    # Samples lie on the same trajectory: those of another rate agree where the times do.
+    # Samples are of one trajectory: those of another rate agree at equal times.
     other = fly(WOBBLING, setup, sample_rate=999.0).trajectory
     assert_allclose(t.rows, other.rows[::3][: len(t)], rtol=1e-9, atol=1e-9)
 
@@ -149,7 +149,7 @@ def test_the_apex_is_the_highest_point():
     assert flight.apex >= heights.max()
 
 
-def test_the_duration_ends_a_flight_to_the_bit():
+def test_a_flight_ends_at_its_duration_to_the_bit():
     flight = fly(WOBBLING, Setup(disc=FRISBEE, step=3e-3), duration=1.0)
     assert not flight.landed
     assert flight.time == 1.0
@@ -167,8 +167,8 @@ def test_a_step_too_long_for_the_spin_is_refused():
     fly(Launch(spin=100.0), dataclasses.replace(setup, model='precession'))
 
 
-def test_no_number_leaves_the_finite_ones():
-    """A disc lighter than dust in a hurricane ends as an error, not as NaN."""
+def test_a_flight_beyond_finite_numbers_raises_an_error():
+    """A disc of almost no mass in a fast flow gives an error, not NaN."""
     disc = dataclasses.replace(FRISBEE, mass=1e-300, aero='linear')
     with pytest.raises(IntegrationError, match='shorter step'):
         fly(Launch(speed=200.0, angle_of_attack=90.0), Setup(disc=disc), duration=1.0)
@@ -180,11 +180,11 @@ def test_every_disc_flies():
 
 
 def test_a_step_too_long_for_the_speed_is_refused():
-    """Slow spin does not make a long step safe: damping and pitch stiffness grow with speed."""
+    """Even at a slow spin, as damping and pitch stiffness grow with speed."""
     fast = Launch(speed=60.0, pitch=5.0, spin=1.0)
     with pytest.raises(ConfigError, match=r'step.*60 m/s'):
         fly(fast, Setup(disc=FRISBEE, step=0.1))
     fine = fly(fast, Setup(disc=FRISBEE, step=1e-3), duration=1.0, ground=False)
-    for step in (5e-3, 1e-2):  # allowed, and then the answer is the same to a millimetre
+    for step in (5e-3, 1e-2):  # allowed, and then accurate to 10 mm
         coarse = fly(fast, Setup(disc=FRISBEE, step=step), duration=1.0, ground=False)
         assert_allclose(coarse.end[:3], fine.end[:3], atol=1e-2)

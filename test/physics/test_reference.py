@@ -1,7 +1,7 @@
 """Landings against an independent integration of the same model (test/reference).
 
-It has its own formulation (axes that spin, a rotation matrix, Dormand-Prince 8 from corner to
-corner of the table) and was written from the paper alone, without sight of the package.
+The reference has a formulation of its own (axes that spin, a rotation matrix, Dormand-Prince 8
+from corner to corner of the table). It was written from the paper alone, without the package.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from reference.cases import LAUNCHES
 from reference.reference_flight import reference_flight
 from sample_discs import FRISBEE
 
-pytestmark = pytest.mark.xdist_group('figures')  # with others that compile the reference
+pytestmark = pytest.mark.xdist_group('figures')  # with other tests that compile the reference
 
 STEP = 5e-4  # s
 
@@ -60,7 +60,7 @@ def test_landing(case):
 
 
 @pytest.mark.parametrize('case', LAUNCHES[::5], ids=lambda case: case['name'])
-def test_way(case):
+def test_trajectory(case):
     """The whole flight agrees, not only its end: position, velocity, attitude and spin."""
     flight = ours(case, sample_rate=20.0)
     t = flight.trajectory

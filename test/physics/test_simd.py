@@ -1,4 +1,4 @@
-"""Lanes reckon what floats reckon, and in vector registers."""
+"""SIMD vectors compute what floats compute, to the bit, in vector registers."""
 
 import math
 import operator
@@ -21,7 +21,7 @@ from disc_sim_ros.physics.kernels.simd import (
     where,
 )
 
-compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason='lanes are compiled only')
+compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason='SIMD is compiled only')
 SPECIAL = [0.0, -0.0, 1.0, -1.5, math.inf, -math.inf, math.nan, 1e-310]
 PAIRS = [(x, y) for x in SPECIAL for y in SPECIAL]
 BINARY = {
@@ -32,7 +32,7 @@ BINARY = {
     'min': lambda x, y: min(x, y, 0.5),
     'max': lambda x, y: max(x, y, -1.0),
     'less': lambda x, y: where(x < y, 1.0, 0.0),
-    'between': lambda x, y: where((x >= y) & (x <= 1.0), x, y),
+    'within': lambda x, y: where((x >= y) & (x <= 1.0), x, y),
     'outside': lambda x, y: where((x > y) | (x < -1.0), 2, y),
     'numbers': lambda x, y: 2 * x - 1 + 0.5 * y / 3,
     'root': lambda x, y: math.sqrt(abs(x) + y * y),
@@ -50,36 +50,38 @@ def numbers(count=50 * WIDTH, seed=1):
 
 @compiled
 @pytest.mark.parametrize('name', BINARY)
-def test_each_lane_is_rounded_as_that_float_alone(name):
+def test_each_lane_is_rounded_as_a_single_float(name):
     act = numba.njit(BINARY[name], error_model='numpy')
 
     @numba.njit(error_model='numpy')
-    def one_by_one(x, y, found):
+    def one_by_one(x, y, results):
         for i in range(len(x)):
-            found[i] = act(x[i], y[i])
+            results[i] = act(x[i], y[i])
 
     @numba.njit(error_model='numpy')
-    def side_by_side(x, y, found):
+    def side_by_side(x, y, results):
         for i in range(len(x)):
-            store(found, i, act(element(x, i), element(y, i)))
+            store(results, i, act(element(x, i), element(y, i)))
 
     x, y = numbers()
-    expected, found = np.empty_like(x), np.empty((len(x) // WIDTH, WIDTH))
+    expected, results = np.empty_like(x), np.empty((len(x) // WIDTH, WIDTH))
     one_by_one(x, y, expected)
-    side_by_side(x.reshape(-1, WIDTH), y.reshape(-1, WIDTH), found)
-    np.testing.assert_array_equal(found.ravel(), expected)
+    side_by_side(x.reshape(-1, WIDTH), y.reshape(-1, WIDTH), results)
+    np.testing.assert_array_equal(results.ravel(), expected)
     number = ~np.isnan(expected)
-    np.testing.assert_array_equal(np.signbit(found.ravel())[number], np.signbit(expected)[number])
+    np.testing.assert_array_equal(
+        np.signbit(results.ravel())[number], np.signbit(expected)[number]
+    )
 
 
 @compiled
 def test_each_lane_reads_its_own_row():
     @numba.njit
-    def read(tables, grid, i, j, found):
+    def read(tables, grid, i, j, results):
         row = table_row(tables, element(i, 0))
         for k in range(8):
-            store(found, k, row[k])
-        store(found, 8, at(grid, element(i, 0), element(j, 0)))
+            store(results, k, row[k])
+        store(results, 8, at(grid, element(i, 0), element(j, 0)))
         return any_of(element(i, 0) > 3.0), any_of(element(i, 0) > 4.0)
 
     rng = np.random.default_rng(2)
@@ -88,19 +90,19 @@ def test_each_lane_reads_its_own_row():
     i = rng.integers(0, 5, (1, WIDTH)).astype(float)
     i[0, 0] = 4.0
     j = rng.integers(0, 3, (1, WIDTH)).astype(float)
-    found = np.empty((9, WIDTH))
-    assert read(tables, grid, i, j, found) == (True, False)
+    results = np.empty((9, WIDTH))
+    assert read(tables, grid, i, j, results) == (True, False)
     for lane in range(WIDTH):
         row = int(i[0, lane])
-        np.testing.assert_array_equal(found[:8, lane], tables[row, 8 * lane : 8 * lane + 8])
-        assert found[8, lane] == grid[row, int(j[0, lane])]
+        np.testing.assert_array_equal(results[:8, lane], tables[row, 8 * lane : 8 * lane + 8])
+        assert results[8, lane] == grid[row, int(j[0, lane])]
 
 
 @compiled
 @pytest.mark.skipif(
     not binding.get_host_cpu_features().get('avx2', False), reason='no AVX2 in this processor'
 )
-def test_lanes_are_vector_registers():
+def test_simd_vectors_are_in_vector_registers():
     @numba.njit
     def multiply(x):
         store(x, 0, element(x, 0) * element(x, 0))
@@ -112,7 +114,7 @@ def test_lanes_are_vector_registers():
     assert all('ymm' in line or 'zmm' in line for line in products)
 
 
-def test_arctangent_is_that_of_the_library():
+def test_arctangent_agrees_with_the_library():
     y, x = numbers(4000, seed=3)
     usual = np.isfinite(x) & np.isfinite(y) & (np.abs(x) != 1e-310) & (np.abs(y) != 1e-310)
     for b, a in zip(y[usual].tolist(), np.abs(x[usual]).tolist(), strict=True):
@@ -125,7 +127,7 @@ def test_arctangent_is_that_of_the_library():
     assert math.isnan(arctangent(math.nan, 1.0))
 
 
-def test_plain_python_makes_the_same_choices():
+def test_plain_functions_work_on_floats():
     assert where(True, 1.0, 2.0) == 1.0  # noqa: FBT003
     assert any_of(operator.gt(2.0, 1.0))
     assert (floor(-0.5), floor(2.0)) == (-1.0, 2.0)

@@ -1,4 +1,4 @@
-"""The stepwise simulator: the same flight as `fly` to the bit, and steered on the way."""
+"""The stepwise simulator: the same flight as `fly` to the bit, with control on the way."""
 
 import dataclasses
 import itertools
@@ -23,7 +23,7 @@ GUSTY = Wind(mean=(1.0, 2.0, 0.0), turbulence=10.0, seed=5)
 @pytest.mark.parametrize(
     ('model', 'wind', 'chunk'), list(itertools.product(MODELS, (Wind(), GUSTY), (1, 7, 10_000)))
 )
-def test_steps_of_any_number_are_the_flight(model, wind, chunk):
+def test_any_number_of_steps_at_a_time_gives_the_same_flight(model, wind, chunk):
     setup = Setup(disc=FRISBEE, model=model, wind=wind)
     control = Control(C_L=0.01)
     whole = fly(LAUNCH, setup, control=control, sample_rate=1000.0)
@@ -44,7 +44,7 @@ def test_steps_of_any_number_are_the_flight(model, wind, chunk):
     ('roll', 'pitch', 'yaw'), [(25, 30, 76), (36, 51, -31), (-34, 27, -16), (-28, 13, 16)]
 )
 def test_a_tilted_release_is_completed_once(roll, pitch, yaw):
-    """These quaternions move by their last bit when they are made unit ones a second time."""
+    """A second normalisation would change the last bit of these quaternions."""
     launch = Launch(roll=roll, pitch=pitch, yaw=yaw, height=5.0)
     setup = Setup(disc=FRISBEE)
     sim = FlightSimulator(setup, launch.state())
@@ -65,7 +65,7 @@ def test_a_landed_disc_lies_still():
     assert sim.observe() == (0.0,) * 12
 
 
-def test_commands_hold_from_the_next_step():
+def test_control_inputs_act_from_the_next_step():
     sim = FlightSimulator(Setup(disc=FRISBEE, air=VACUUM), LAUNCH.state())
     sim.advance(100)
     spin = sim.state.r
@@ -92,35 +92,35 @@ def test_observation_is_the_derivative_of_the_flight():
     sim = FlightSimulator(Setup(disc=FRISBEE, step=1e-4), LAUNCH.state())
     sim.control = Control(C_L=0.02, C_N=0.001)
     sim.advance(1000)
-    before, seen = sim.state, sim.observe()
+    before, observation = sim.state, sim.observe()
     sim.advance(1)
     after = np.subtract(sim.state, before) / 1e-4
     # One-sided over 0.1 ms: half of the second derivative, nutation at 60 rad/s of 100 rad/s^2.
-    assert_allclose(seen[:3], after[3:6], atol=2e-2)
-    assert_allclose(seen[3:6], after[10:13], atol=0.5)
-    assert max(abs(x) for x in seen[3:6]) > 5.0
+    assert_allclose(observation[:3], after[3:6], atol=2e-2)
+    assert_allclose(observation[3:6], after[10:13], atol=0.5)
+    assert max(abs(x) for x in observation[3:6]) > 5.0
 
 
 def test_loads_are_force_and_moment_of_the_motion():
-    """m dV/dt - m g turned into the disc is the force; I domega/dt + gyroscopics the moment."""
+    """m dV/dt - m g in body axes is the force; I domega/dt + gyroscopic terms is the moment."""
     from disc_sim_ros.physics import frames
 
     sim = FlightSimulator(Setup(disc=FRISBEE), LAUNCH.state())
     sim.advance(500)
-    seen, s = sim.observe(), sim.state
+    observation, s = sim.observe(), sim.state
     R = frames.rotation_matrix(s[6:10])
-    felt = FRISBEE.mass * (np.array(seen[:3]) - (0.0, 0.0, 9.81))
-    assert_allclose(R.T @ felt, seen[6:9], atol=1e-12)
+    force = FRISBEE.mass * (np.array(observation[:3]) - (0.0, 0.0, 9.81))
+    assert_allclose(R.T @ force, observation[6:9], atol=1e-12)
     I_x, I_z = FRISBEE.inertia_diametral, FRISBEE.inertia_axial
     moment = (
-        I_x * seen.p_dot + s.q * s.r * I_z,
-        I_x * seen.q_dot - s.p * s.r * I_z,
-        I_z * seen.r_dot,
+        I_x * observation.p_dot + s.q * s.r * I_z,
+        I_x * observation.q_dot - s.p * s.r * I_z,
+        I_z * observation.r_dot,
     )
-    assert_allclose(seen[9:12], moment, atol=1e-14)
+    assert_allclose(observation[9:12], moment, atol=1e-14)
 
 
-def test_a_flight_beyond_the_finite_numbers_stops_at_the_last_of_them():
+def test_a_flight_beyond_finite_numbers_stops_at_its_last_finite_state():
     disc = dataclasses.replace(FRISBEE, mass=1e-300, aero='linear')
     sim = FlightSimulator(Setup(disc=disc), Launch(speed=200.0, angle_of_attack=90.0).state())
     with pytest.raises(IntegrationError, match='shorter step'):
@@ -134,7 +134,7 @@ def test_a_release_underground_is_refused():
     FlightSimulator(Setup(disc=FRISBEE), Launch(height=-1.0).state(), ground=False)
 
 
-def test_long_flights_do_not_run_out_of_gusts():
+def test_long_flights_draw_more_gusts():
     setup = Setup(disc=FRISBEE, wind=GUSTY, step=0.01)
     sim = FlightSimulator(setup, Launch().state(), ground=False)
     for _ in range(30):

@@ -1,4 +1,4 @@
-"""What a flight must not depend on, and what must mirror it."""
+"""Symmetries of a flight: heading, mirror image, moving air, and the mark on the rim."""
 
 import dataclasses
 import itertools
@@ -14,7 +14,7 @@ from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
 from sample_discs import FRISBEE
 
-# A steered flight with a wobble: everything that could break a symmetry is switched on.
+# A controlled flight with a wobble: everything that could break a symmetry is switched on.
 LAUNCH = Launch(
     speed=17.0, pitch=12.0, roll=8.0, angle_of_attack=3.0, sideslip=5.0, spin=45.0,
     roll_rate=3.0, pitch_rate=-2.0, height=1.5,
@@ -39,7 +39,7 @@ def turned(vectors, degrees):
 
 @pytest.mark.parametrize(('model', 'axes'), list(itertools.product(MODELS, MOMENT_AXES)))
 @pytest.mark.parametrize('disc', ['frisbee', 'frisbee_linear', 'frisbee_roll_moment'])
-def test_spin_and_roll_negated_mirror_the_path(disc, model, axes):
+def test_negated_spin_and_roll_mirror_the_path(disc, model, axes):
     setup = Setup(
         disc=disc_file.load_disc(disc), model=model, moment_axes=axes, wind=Wind(mean=WIND)
     )
@@ -59,7 +59,7 @@ def test_spin_and_roll_negated_mirror_the_path(disc, model, axes):
 
 
 @pytest.mark.parametrize('yaw', [30.0, 90.0, -135.0, 360.0])
-def test_the_heading_turns_the_path_and_nothing_else(yaw):
+def test_the_heading_turns_the_path_and_changes_nothing_else(yaw):
     setup = Setup(disc=FRISBEE, wind=Wind(mean=WIND))
     ahead = sampled(LAUNCH, setup)
     wind = Wind(mean=tuple(turned(WIND, yaw).tolist()))
@@ -69,12 +69,12 @@ def test_the_heading_turns_the_path_and_nothing_else(yaw):
 
 
 @pytest.mark.parametrize('model', MODELS)
-def test_a_flight_in_wind_is_the_same_flight_seen_from_the_moving_air(model):
-    """Galilean invariance: only the velocity relative to the air counts."""
+def test_a_flight_in_wind_is_the_still_air_flight_in_moving_axes(model):
+    """Galilean invariance: only the velocity relative to the air matters."""
     still = Setup(disc=FRISBEE, model=model)
     moving = dataclasses.replace(still, wind=Wind(mean=WIND))
     rest = sampled(LAUNCH, still)
-    # The launch speaks of the velocity over the ground, so the same airspeed needs a state.
+    # A launch has the velocity over the ground, so that the same airspeed needs another state.
     launch = _Shifted(**dataclasses.asdict(LAUNCH))
     carried = sampled(launch, moving)
     shift = rest.t[:, None] * np.array(WIND)
@@ -84,7 +84,7 @@ def test_a_flight_in_wind_is_the_same_flight_seen_from_the_moving_air(model):
 
 
 class _Shifted(Launch):
-    """The launch of a thrower who rides on the wind."""
+    """A launch with the velocity of the wind added."""
 
     __slots__ = ()
 
@@ -93,10 +93,11 @@ class _Shifted(Launch):
         return s._replace(VX=s.VX + WIND[0], VY=s.VY + WIND[1], VZ=s.VZ + WIND[2])
 
 
-def test_the_mark_on_the_rim_does_not_matter():
-    """A disc is the same after any turn about its axis: sideslip with turned rates and roll.
+def test_the_spin_angle_at_release_does_not_matter():
+    """A disc is the same after any turn about its axis.
 
-    Level, a yaw of -90 degrees with a sideslip of 90 degrees is the same throw as none of either.
+    Of a level disc, a yaw of -90 degrees with a sideslip of 90 degrees is the same throw as zero
+    of both, with the rates turned.
     """
     setup = Setup(disc=FRISBEE)
     launch = dataclasses.replace(LAUNCH, pitch=0.0, roll=0.0, sideslip=0.0)

@@ -1,4 +1,4 @@
-"""Wind: profile, Dryden gusts against their spectra, seeds."""
+"""Wind: profile, Dryden gusts against their correlations, seeds."""
 
 import dataclasses
 import itertools
@@ -43,7 +43,7 @@ def gusts(seed, V, height, dt, count):
 
 
 def test_gusts_have_the_variance_and_the_correlation_of_dryden():
-    """Longitudinal exp(-tau), across exp(-tau) (1 - tau / 2), tau = V t / L."""
+    """Longitudinal exp(-tau), lateral and vertical exp(-tau) (1 - tau / 2), tau = V t / L."""
     V, height, dt, count = 15.0, 10.0, 0.05, 100_000
     rows = gusts(1, V, height, dt, count)
     L_u, L_w, sigma_u, sigma_w = scales(-height, 10.0)
@@ -89,7 +89,7 @@ def gusty(seed, step=1e-3, rate=100.0, **wind):
     return fly(Launch(height=1.5), setup, sample_rate=rate)
 
 
-def test_a_seed_is_a_flight():
+def test_each_seed_gives_a_flight_of_its_own():
     assert gusty(5).end == gusty(5).end
     ends = [gusty(seed).position for seed in range(4)]
     for a, b in itertools.pairwise(ends):
@@ -97,14 +97,14 @@ def test_a_seed_is_a_flight():
 
 
 def test_gusts_do_not_depend_on_the_step():
-    """They live on a grid of 10 ms of their own, so that a finer step is the same flight."""
+    """They have a time grid of their own, 10 ms, so that a finer step gives the same flight."""
     coarse, fine = gusty(7, 2e-3), gusty(7, 1e-3 / 4)
-    # Gusts drive alpha over many corners of the table, each worth (2 ms)^2: other gusts would
-    # move the landing by metres (test_a_seed_is_a_flight), these by less than a millimetre.
+    # Gusts drive alpha over many corners of the table, and each adds an error of order (2 ms)^2:
+    # less than a millimetre, where other gusts would move the landing by metres.
     assert_allclose(coarse.position, fine.position, atol=1e-3)
     wind = coarse.trajectory.wind
     assert_allclose(wind, fine.trajectory.wind[: len(wind)], atol=1e-3)
-    # A step that straddles the grid meets them up to a step late.
+    # A step across a grid point takes the new gust up to a step late.
     for step in (3e-3, 7e-3, 2e-2):
         assert_allclose(gusty(7, step).position, fine.position, atol=0.1)
 

@@ -29,19 +29,19 @@ def _without_scipy() -> Iterator[None]:
         del sys.modules['scipy']
 
 
+COMPILED = False
+NUMBA_ERROR = ''  # why numba cannot be used; '' where it can, or is switched off
 try:
     with _without_scipy():
         import numba
         import numba.extending
-except ImportError as error:
-    COMPILED = False
-    NUMBA_ERROR = str(error)  # '' where numba can be imported
-else:
-    COMPILED = not numba.config.DISABLE_JIT
-    NUMBA_ERROR = ''
 
-if COMPILED:
-    from disc_sim_ros.physics.kernels import code_cache, simd_numba  # noqa: F401
+    if not numba.config.DISABLE_JIT:
+        from disc_sim_ros.physics.kernels import code_cache, simd_numba  # noqa: F401
+
+        COMPILED = True
+except Exception as error:  # it is missing, or does not fit this numpy: that can raise anything
+    NUMBA_ERROR = f'{type(error).__name__}: {error}'
 
 F = TypeVar('F', bound=Callable[..., Any])
 
@@ -94,8 +94,8 @@ def note_before(*functions: Callable[..., Any], seconds: int) -> str:
     """
     if NUMBA_ERROR:
         return (
-            f'flights run in plain Python, hundreds of times slower: {NUMBA_ERROR}; '
-            'to compile them, install numba (pip install numba)'
+            f'numba cannot be imported ({NUMBA_ERROR}): flights run in plain Python, hundreds of '
+            'times slower; "pip install numba" makes them fast'
         )
     if all(map(is_compiled, functions)):
         return ''
