@@ -1,5 +1,6 @@
 """Every exception class of the package; each message is one line that a user can act on."""
 
+import re
 import reprlib
 from typing import Self
 
@@ -7,6 +8,9 @@ _LONGEST = 80  # characters
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel = 2
 _SHORT.maxstring = _SHORT.maxother = 60
+# Characters that move the cursor, colour, or turn the direction of a text.
+_CONTROLS = re.compile('[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]')
+_CONTROLS_IN_LINES = re.compile('[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]')
 
 
 class DiscSimError(Exception):
@@ -52,6 +56,10 @@ class InterruptedSweepError(DiscSimError):
 class BagError(DiscSimError):
     """A bag cannot be written, read or repaired; the message says which bag, where and why."""
 
+    def __init__(self, message: str) -> None:
+        """Keep the message, with the control characters of names in a bag escaped."""
+        super().__init__(printable(message))
+
 
 class DamageError(BagError):
     """The bytes of a part of a file contradict the format or the checksum."""
@@ -68,6 +76,17 @@ class WriteError(BagError):
         """Keep the message and its `reason`."""
         self.reason = reason
         super().__init__(message)
+
+
+def printable(text: str, *, lines: bool = False) -> str:
+    """Return text with control characters escaped, so that a bag does not command the terminal.
+
+    Args:
+        text: Such as the name of a topic.
+        lines: Keep newlines and tabs.
+    """
+    controls = _CONTROLS_IN_LINES if lines else _CONTROLS
+    return controls.sub(lambda match: match[0].encode('unicode_escape').decode(), text)
 
 
 def brief(value: object) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from disc_sim_ros.bags.contents import Loss
+from disc_sim_ros.errors import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +65,12 @@ class RepairReport:
 
     def summary(self) -> str:
         """Return the report to read."""
-        width = max(map(len, self.kept), default=0)
+        names = {name: printable(name) for name in self.kept}
+        width = max(map(len, names.values()), default=0)
         lines = [f'{self.source} -> {self.target}']
         lines += [
-            f'  {name:{width}}  {_count(count, "message")}' for name, count in self.kept.items()
+            f'  {names[name]:{width}}  {_count(count, "message")}'
+            for name, count in self.kept.items()
         ]
         lines.append(
             f'  kept  {_count(self.message_count, "message")} of '
@@ -77,14 +80,14 @@ class RepairReport:
             known = sum(loss.messages or 0 for loss in self.losses)
             messages = f', {_count(known, "message")} that are known of' if known else ''
             lines.append(f'  lost  {_count(self.bytes_lost, "byte")}{messages}')
-            lines += [f'    {loss}' for loss in self.losses]
+            lines += [f'    {printable(str(loss))}' for loss in self.losses]
         elif self.was_whole:
             lines.append('  the bag was whole')
         else:
             lines.append('  lost  nothing')
             if not self.mended:
                 lines.append('  mended: metadata.yaml was missing or old')
-        lines += [f'  mended: {text}' for text in self.mended]
+        lines += [f'  mended: {printable(text)}' for text in self.mended]
         return '\n'.join(lines)
 
 

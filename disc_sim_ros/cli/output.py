@@ -12,7 +12,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import files
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -103,12 +103,12 @@ def show(text: str) -> None:
         DiscSimError: The system refuses, for instance for lack of space.
     """
     with _one_line_errors():
-        print(text, flush=True)
+        print(printable(text, lines=True), flush=True)
 
 
 def note(prog: str, text: str) -> None:
     """Write one line to stderr, after the name of the program."""
-    sys.stderr.write(f'{prog}: {text}\n')
+    sys.stderr.write(f'{prog}: {printable(text)}\n')
 
 
 @contextmanager

@@ -224,6 +224,20 @@ def test_help_names_units_and_exit_codes():
         assert word in done.stdout
 
 
+def test_control_characters_of_a_bag_do_not_reach_the_terminal(tmp_path):
+    evil = '/a\x1b[31mred\x07\nnew \u202eline'
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write(bag.add(topic(evil, '\x1b]0;title\x07')), b'\0\1\0\0', 1, 1)
+    done = run(tmp_path / 'bag', tmp_path / 'made')
+    assert done.returncode == 0, done.stderr
+    assert not set(done.stdout + done.stderr) & set('\x1b\x07\u202e')
+    assert r'/a\x1b[31mred\x07\nnew \u202eline  1 message' in done.stdout
+    assert [t.name for t in open_bag(tmp_path / 'made').topics] == [evil]
+    with pytest.raises(BagError) as caught:
+        list(open_bag(tmp_path / 'made').messages())
+    assert str(caught.value).isprintable()
+
+
 def test_ctrl_c_leaves_no_half_bag(tmp_path):
     write_bag(tmp_path / 'big', 40_000)
     child = subprocess.Popen(

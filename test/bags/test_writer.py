@@ -140,7 +140,9 @@ def test_a_publisher_that_comes_before_the_first_message_is_in_the_channel(tmp_p
 
 
 @pytest.mark.parametrize('split', [True, False])
-def test_qos_of_a_publisher_that_comes_later_is_kept_and_rosbags_reads_every_message(tmp_path, split):
+def test_qos_of_a_publisher_that_comes_later_is_kept_and_rosbags_reads_every_message(
+    tmp_path, split
+):
     """rosbags leaves out the messages of channels whose QoS is not that of metadata.yaml."""
     first, second = Qos(), Qos(durability='transient_local')
     with BagWriter(tmp_path / 'bag') as bag:
