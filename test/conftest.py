@@ -1,16 +1,16 @@
-"""For all tests: ROS messages check their fields, and nodes are tested one after the other."""
+"""Settings of all tests: ROS messages check their fields, tests of nodes run in two groups."""
 
 import os
 import signal
 
 import pytest
 
-# A shell has what it starts in the background ignore Ctrl-C, and so would what the tests start.
+# A shell makes its background processes ignore Ctrl-C, and the processes of the tests inherit it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first imported
 
-IN_REAL_TIME, MAKES_WAY = 0, 10  # niceness
-FIRST = {  # half of those with nodes
+IN_REAL_TIME, IN_BACKGROUND = 0, 10  # niceness
+FIRST = {  # the files of the first group
     'sim/test_node_control', 'sim/test_node_input', 'sim/test_node_process', 'recorder/test_node',
     'ros/test_parameters', 'ros/test_parameters_of_a_node',
 }  # fmt: skip
@@ -18,10 +18,10 @@ FIRST = {  # half of those with nodes
 
 @pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks at the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Deal out the tests of real nodes to two workers, and begin with them.
+    """Give the tests of real nodes to two workers, and run them first.
 
-    They wait more than they work, but more than two at a time would share two cores badly. Next
-    come the modules that a group keeps on one worker, for what they make once; then all the rest.
+    They mostly wait, but more than two at a time would disturb each other on two cores. Next are
+    the modules that a group keeps on one worker, to share a fixture; then all other tests.
     """
     for item in items:
         if is_ros(item):
@@ -31,19 +31,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Fail where pytest-xdist does not see the groups, as with pytest 9.2."""
+    """Fail if pytest-xdist ignores the groups, as with pytest 9.2."""
     grouped = [item for item in session.items if item.get_closest_marker('xdist_group')]
     if getattr(session.config.option, 'loadgroup', False) and grouped:
         assert '@' in grouped[0].nodeid, 'this pytest and this pytest-xdist keep no groups'
 
 
 def is_ros(item: pytest.Item) -> bool:
-    """Say whether a test runs real nodes."""
+    """Return True if a test runs real nodes."""
     return item.get_closest_marker('ros') is not None
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let what does not run in real time make way, where this can be taken back: for root."""
+    """Lower the priority of tests without nodes, if it can be raised again: for root."""
     if 'PYTEST_XDIST_WORKER' in os.environ and os.geteuid() == 0:
-        nice = IN_REAL_TIME if is_ros(item) else MAKES_WAY
+        nice = IN_REAL_TIME if is_ros(item) else IN_BACKGROUND
         os.setpriority(os.PRIO_PROCESS, 0, nice)

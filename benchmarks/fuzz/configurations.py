@@ -32,7 +32,7 @@ _CHANGES = (
 
 def seeds() -> list[bytes]:
     """Return configurations as `sim_node` publishes them."""
-    found = []
+    documents = []
     for disc, model in (('frisbee', 'exact'), ('wraith', 'precession'), ('flat_plate', 'exact')):
         config = configuration({'disc': disc, 'model': model, 'wind.turbulence': 5.0})
         flight = FlightConfig(
@@ -44,8 +44,8 @@ def seeds() -> list[bytes]:
             ground=config.ground,
             command_timeout=config.command_timeout,
         )
-        found.append(configuration_text(flight).encode())
-    return found
+        documents.append(configuration_text(flight).encode())
+    return documents
 
 
 def one(data: bytes) -> None:
@@ -73,7 +73,7 @@ def one(data: bytes) -> None:
 
 
 def _is_slow(document: object) -> bool:
-    """Say whether it asks for more steps than a fuzz target has time for."""
+    """Return True if it needs more steps than a fuzz target has time for."""
     rate = document.get('physics_rate') if isinstance(document, dict) else None
     try:
         return float(rate) > 1e5  # type: ignore[arg-type]

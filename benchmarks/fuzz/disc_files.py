@@ -30,14 +30,14 @@ _FILE = scratch.folder() / 'disc.yaml'
 
 def seeds() -> list[bytes]:
     """Return every disc of the catalogue, as its file and as a complete document."""
-    found = []
+    documents = []
     for name in disc_file.disc_names():
         disc = disc_file.load_disc(name)
-        found.append(yaml.safe_dump(disc_file.disc_document(disc)).encode())
-        found.append(f'based_on: {name}\nmass_kg: 0.2\ndamping: {{C_Lp: -0.4}}\n'.encode())
+        documents.append(yaml.safe_dump(disc_file.disc_document(disc)).encode())
+        documents.append(f'based_on: {name}\nmass_kg: 0.2\ndamping: {{C_Lp: -0.4}}\n'.encode())
         path = Path(disc_file.__file__).parent / 'discs' / f'{name}.yaml'
-        found.append(path.read_bytes())
-    return found
+        documents.append(path.read_bytes())
+    return documents
 
 
 def one(data: bytes) -> None:

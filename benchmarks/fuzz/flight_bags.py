@@ -31,12 +31,12 @@ _CODES = {0, 1, 2, 3}
 
 def seeds() -> list[bytes]:
     """Return steered flights at 20 messages a second of what an analysis reads."""
-    found = []
+    files = []
     for number, changes in enumerate(({}, {'disc': 'frisbee', 'model': 'precession'})):
         whole = flights.steered_bag(_PLACE / f'{number}', **_SMALL, **changes)
         thin = _thinned(whole, _PLACE / f'thin_{number}')
-        found.append(next(thin.glob('*.mcap')).read_bytes())
-    return found
+        files.append(next(thin.glob('*.mcap')).read_bytes())
+    return files
 
 
 def _thinned(source: Path, target: Path) -> Path:

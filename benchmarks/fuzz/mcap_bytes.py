@@ -16,7 +16,7 @@ _DEEPEST = 1 << 20  # bytes of a chunk that a mutator unpacks
 
 def records(data: bytes) -> list[tuple[int, bytes]] | None:
     """Return opcode and content of each record; None where they do not fill the bytes."""
-    found = []
+    contents = []
     at = 0
     while at < len(data):
         if len(data) - at < _HEAD.size:
@@ -25,9 +25,9 @@ def records(data: bytes) -> list[tuple[int, bytes]] | None:
         at += _HEAD.size
         if length > len(data) - at:
             return None
-        found.append((opcode, data[at : at + length]))
+        contents.append((opcode, data[at : at + length]))
         at += length
-    return found
+    return contents
 
 
 def mutate(data: bytes, rng: random.Random) -> bytes | None:

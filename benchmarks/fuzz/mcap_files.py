@@ -138,13 +138,13 @@ def _repair(source: Path, target: Path, size: int) -> None:
 
 def _raw(bag: Bag) -> list[RawMessage]:
     """Return all messages, as far as they can be decompressed."""
-    found = []
+    messages = []
     try:
-        found.extend(bag.raw())
+        messages.extend(bag.raw())
     except BagError as error:
         if 'the message at' not in str(error):  # one that only looks compressed
             raise
-    return found
+    return messages
 
 
 def _require_line(error: BagError) -> None:

@@ -89,18 +89,18 @@ def _watch(name: str, chosen: argparse.Namespace) -> int:
     cover = re.findall(r'cov: (\d+) ft: (\d+) corp: (\d+)', text)
     edges, features, inputs = cover[-1] if cover else ('?', '?', '?')
     slow = re.findall(r'slowest_unit_time_sec: (\d+)', text)
-    found = re.findall(r'^FOUND (.*)$', text, re.MULTILINE)
+    findings = re.findall(r'^FOUND (.*)$', text, re.MULTILINE)
     if code != 0:
-        found.append(f'the process ended with {code}')
+        findings.append(f'the process ended with {code}')
     print(
         f'{name}: {runs[-1] if runs else "?"} inputs in {chosen.seconds} s, {edges} edges, '
         f'{features} features, {inputs} kept, slowest {slow[-1] if slow else "?"} s: '
-        f'{f"{len(found)} FOUND, see {log}" if found else "nothing found"}',
+        f'{f"{len(findings)} FOUND, see {log}" if findings else "no findings"}',
         flush=True,
     )
-    for line in found:
+    for line in findings:
         print(f'  {line}', flush=True)
-    return int(bool(found))
+    return int(bool(findings))
 
 
 def _target(name: str) -> object:

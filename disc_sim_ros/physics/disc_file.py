@@ -51,8 +51,8 @@ _OPTIONAL = {DISC['area'].key, *_DAMPING}
 
 def disc_names() -> tuple[str, ...]:
     """Return the names of the discs in the package."""
-    found = (Path(item.name) for item in _FOLDER.iterdir())
-    return tuple(sorted(path.stem for path in found if path.suffix == '.yaml'))
+    files = (Path(item.name) for item in _FOLDER.iterdir())
+    return tuple(sorted(path.stem for path in files if path.suffix == '.yaml'))
 
 
 def load_disc(name_or_file: str) -> Disc:
@@ -248,15 +248,15 @@ class _StrictLoader(yaml.SafeLoader):
         node: yaml.MappingNode,
         deep: bool = False,  # noqa: FBT002
     ) -> dict[Any, Any]:
-        seen = set()
+        keys = set()
         for key_node, _ in node.value:
             key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
-            if key is None or key in seen or key == '<<':
-                problem = 'the repeated key' if key in seen else 'a key that is not a word'
+            if key is None or key in keys or key == '<<':
+                problem = 'the repeated key' if key in keys else 'a key that is not a word'
                 raise yaml.constructor.ConstructorError(
                     None, None, f'{problem} {key or ""}'.strip(), key_node.start_mark
                 )
-            seen.add(key)
+            keys.add(key)
         return super().construct_mapping(node, deep)
 
 

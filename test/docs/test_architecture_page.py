@@ -61,13 +61,13 @@ def imports(graph: grimp.ImportGraph) -> set[Edge]:
 
 
 def reachable(edges: set[Edge], start: str) -> set[str]:
-    found, waiting = set(), [start]
+    reached, waiting = set(), [start]
     while waiting:
         name = waiting.pop()
-        new = {b for a, b in edges if a == name} - found
-        found |= new
+        new = {b for a, b in edges if a == name} - reached
+        reached |= new
         waiting += new
-    return found
+    return reached
 
 
 def without_implied(edges: set[Edge]) -> set[Edge]:
@@ -133,9 +133,9 @@ def test_the_drawing_belongs_to_its_text():
 
 
 def rows() -> list[tuple[str, str]]:
-    found = re.findall(r'^\| `([\w/.]+\.py)` \| (.*) \|$', PAGE, re.MULTILINE)
-    assert len(found) > 25
-    return found
+    steps = re.findall(r'^\| `([\w/.]+\.py)` \| (.*) \|$', PAGE, re.MULTILINE)
+    assert len(steps) > 25
+    return steps
 
 
 def test_every_file_exists():
@@ -161,13 +161,13 @@ def defines(source: str, name: str) -> bool:
     first, _, member = name.partition('.')
     for node in ast.parse(source).body:
         match node:
-            case ast.ClassDef(name=found) if found == first:
+            case ast.ClassDef(name=defined) if defined == first:
                 return not member or member in members(node)
-            case ast.FunctionDef(name=found) if found == first:
+            case ast.FunctionDef(name=defined) if defined == first:
                 return not member
-            case ast.Assign(targets=[ast.Name(id=found)]) if found == first:
+            case ast.Assign(targets=[ast.Name(id=defined)]) if defined == first:
                 return not member
-            case ast.AnnAssign(target=ast.Name(id=found)) if found == first:
+            case ast.AnnAssign(target=ast.Name(id=defined)) if defined == first:
                 return not member
     return False
 

@@ -92,9 +92,9 @@ def test_throw_flies_as_the_physics_computes(ros, namespace):
         f'landed: {flight.range:.2f} m in {flight.time:.3f} s',
     ]
     ros.spin_until(lambda: landings(events), 'the landing')
-    found = {pair.key: float(pair.value) for pair in landings(events)[0].values}
-    assert found['landing_x_m'] == pytest.approx(flight.position[0], abs=1e-9)
-    assert found['landing_y_m'] == pytest.approx(flight.position[1], abs=1e-9)
+    values = {pair.key: float(pair.value) for pair in landings(events)[0].values}
+    assert values['landing_x_m'] == pytest.approx(flight.position[0], abs=1e-9)
+    assert values['landing_y_m'] == pytest.approx(flight.position[1], abs=1e-9)
 
 
 def test_throw_replaces_a_flying_disc_and_reports_its_own_flight(ros):
@@ -204,7 +204,7 @@ def test_spiral_flies_the_manoeuvre_of_the_paper(tmp_path, load):
     spin = module.parameters(turn)['launch.spin']
     expected = fly(Launch(**turn.launch, spin=spin), FRISBEE, control=Control(*turn.command))
     line = output.splitlines()[-1]
-    found = re.search(r'x (-?[\d.]+) m, y (-?[\d.]+) m, .* after ([\d.]+) s', line)
-    x, y, time = map(float, found.groups())
+    match = re.search(r'x (-?[\d.]+) m, y (-?[\d.]+) m, .* after ([\d.]+) s', line)
+    x, y, time = map(float, match.groups())
     assert (x, y) == pytest.approx(expected.position[:2], abs=0.006)  # two digits
     assert time == pytest.approx(expected.time, abs=0.006)

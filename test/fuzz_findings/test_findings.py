@@ -50,8 +50,8 @@ DEFINITIONS = (
 @pytest.mark.parametrize('definition', DEFINITIONS)
 def test_a_definition_that_is_none_is_told_in_one_line(tmp_path, definition):
     with BagWriter(tmp_path / 'bag') as writer:
-        told = Topic(name='/a', type='std_msgs/msg/String', definition=definition)
-        topic = writer.add(told)
+        described = Topic(name='/a', type='std_msgs/msg/String', definition=definition)
+        topic = writer.add(described)
         writer.write(topic, b'\x00\x01\x00\x00\x03\x00\x00\x00hi\x00', START, START)
     with pytest.raises(BagError, match='/a') as refused:
         list(open_bag(tmp_path / 'bag').messages())

@@ -230,10 +230,10 @@ def test_colcon_installs_all_files(colcon_workspace):
 def test_python_imports_the_package_that_colcon_installed(colcon_workspace):
     """With the editable install of this environment the tests below would prove nothing."""
     python = colcon_workspace / 'environment/bin/python'
-    found = run_sourced(
+    imported = run_sourced(
         colcon_workspace, python, '-P', '-c', f'import {PACKAGE}; print({PACKAGE}.__file__)'
     )
-    assert Path(found.strip()).is_relative_to(colcon_workspace / 'install')
+    assert Path(imported.strip()).is_relative_to(colcon_workspace / 'install')
 
 
 @pytest.mark.packaging

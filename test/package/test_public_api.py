@@ -82,10 +82,10 @@ def typed_imports(source: str) -> dict[str, str]:
 
 
 def test_type_checkers_see_the_names_that_python_imports():
-    seen = typed_imports((PACKAGE / '__init__.py').read_text(encoding='utf-8'))
-    assert seen == disc_sim_ros._MODULE_OF
-    assert sorted(seen) == sorted(disc_sim_ros.__all__)
-    for name, module in seen.items():  # where it is defined, not passed on
+    typed = typed_imports((PACKAGE / '__init__.py').read_text(encoding='utf-8'))
+    assert typed == disc_sim_ros._MODULE_OF
+    assert sorted(typed) == sorted(disc_sim_ros.__all__)
+    for name, module in typed.items():  # where it is defined, not passed on
         defined = getattr(importlib.import_module(f'disc_sim_ros.{module}'), name)
         assert getattr(defined, '__module__', f'disc_sim_ros.{module}') == f'disc_sim_ros.{module}'
 

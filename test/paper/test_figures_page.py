@@ -30,8 +30,8 @@ def row(what):
 
 
 def test_the_verdicts_are_those_of_the_table():
-    found = report.Report((), judged(), dark=True)
-    for sentence in found.summary():
+    summary_report = report.Report((), judged(), dark=True)
+    for sentence in summary_report.summary():
         assert sentence in PAGE
 
 

@@ -68,14 +68,14 @@ def test_fig_4_has_both_launches():
 
 def test_fig_5_is_as_near_to_the_black_curves_as_documented():
     data = computed('5')
-    found = {curve.share: fig05_typical_flight.rms(curve, data.read) for curve in data.curves}
+    distances = {curve.share: fig05_typical_flight.rms(curve, data.read) for curve in data.curves}
     # docs/deviations.md, all 21 rows, constant spin: half the last digit.
     for share, expected in (
         (PRINTED, (0.20, 1.81, 1.12)),
         (TENTH, (0.10, 0.57, 0.24)),
         (HUNDREDTH, (0.10, 0.42, 0.21)),
     ):
-        three = [found[share][name] for name in ('V', 'alpha', 'lambda')]
+        three = [distances[share][name] for name in ('V', 'alpha', 'lambda')]
         assert three == pytest.approx(expected, abs=0.005)
     assert all(fig05_typical_flight.rms(c, data.read, '_lin')['phi'] > 20.0 for c in data.linear)
 
@@ -195,10 +195,10 @@ def _law(data):
 
 @pytest.mark.parametrize('key', FIGURES)
 def test_each_csv_has_units_and_the_samples(key):
-    found = rows(key)
-    assert len(found) > 10
+    samples = rows(key)
+    assert len(samples) > 10
     unitless = {'curve', 'damping_share', 'AdvR', 'model', 'row', 'time_g_by_V'}
-    for name in found[0]:
+    for name in samples[0]:
         units = ('_s', '_m', '_deg', '_m_s', '_rad_s')
         without = ('_g_by_V2', '_table', '_linear')
         known = name in unitless or name.startswith(('p_hat', 'range_m', 'duration_s'))
@@ -207,9 +207,9 @@ def test_each_csv_has_units_and_the_samples(key):
 
 def test_the_csv_holds_what_is_drawn():
     data = computed('5')
-    found = [row for row in rows('5') if row['curve'] == 'table, damping as printed']
-    assert len(found) == len(data.curves[0].t) == 401
-    last = found[-1]
+    samples = [row for row in rows('5') if row['curve'] == 'table, damping as printed']
+    assert len(samples) == len(data.curves[0].t) == 401
+    last = samples[-1]
     assert float(last['X_forward_m']) == pytest.approx(data.curves[0].flight.end.X, rel=1e-8)
     assert float(last['Z_down_m']) == pytest.approx(data.curves[0].flight.end.Z, rel=1e-8)
     read = [row for row in rows('5') if row['curve'] == 'paper, black, read off']

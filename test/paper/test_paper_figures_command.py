@@ -97,10 +97,10 @@ def test_the_reports_are_whole(made):
 
 def test_a_flight_that_is_off_is_not_called_close():
     far = WrittenFigure('7', 'Fig. 7: x', 'c', ('f.',), ('fig07.csv',), 'θ 10°', 0.02, 1.0)
-    found = report.Report((far,), None, dark=True)
-    assert 'NOT within 1 cm' in ' '.join(found.summary())
-    assert found.checks()[0][-1] == 'NOT within 1 cm'
-    assert 'NOT within 1 cm' in report.html(found)
+    judged = report.Report((far,), None, dark=True)
+    assert 'NOT within 1 cm' in ' '.join(judged.summary())
+    assert judged.checks()[0][-1] == 'NOT within 1 cm'
+    assert 'NOT within 1 cm' in report.html(judged)
 
 
 def test_light_only_and_svg_in_one_process(tmp_path, capsys):

@@ -86,8 +86,8 @@ def statement(number, printed, tenth, **options):
     ],
 )
 def test_the_verdict_follows_from_the_numbers(case, verdict, says):
-    found = judge(case)
-    assert (found.verdict, found.detail) == (verdict, says)
+    result = judge(case)
+    assert (result.verdict, result.detail) == (verdict, says)
 
 
 @pytest.mark.parametrize(

@@ -92,11 +92,11 @@ def test_every_disc_has_a_description(name):
 def test_the_published_numbers(name, numbers):
     disc = disc_file.load_disc(name)
     for key, number in numbers.items():
-        found = getattr(disc, key)
+        value = getattr(disc, key)
         if isinstance(number, float):
-            assert found == pytest.approx(number, rel=1e-15), key  # products are rounded
+            assert value == pytest.approx(number, rel=1e-15), key  # products are rounded
         else:
-            assert found == number, key
+            assert value == number, key
 
 
 def test_the_straight_lines_of_fig_3():
@@ -139,9 +139,9 @@ def test_the_wraith_table_outside_the_measured_range_is_as_its_file_states():
     assert table is not None
     degrees = np.degrees(table.alpha).round(9)
     filled = (degrees < -5) | (degrees > 15)
-    found = np.column_stack([degrees, table.coefficients])[filled]
+    guessed = np.column_stack([degrees, table.coefficients])[filled]
     # The file has four decimals; the sum is rounded once.
-    assert_allclose(found, expected, rtol=0.0, atol=0.5001e-4)
+    assert_allclose(guessed, expected, rtol=0.0, atol=0.5001e-4)
 
 
 def test_the_spin_roll_moment_is_measured_except_where_its_file_states_otherwise():

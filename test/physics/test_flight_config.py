@@ -203,9 +203,9 @@ def test_a_document_with_a_wrong_value_is_refused_in_one_line(key, value):
 def test_a_recording_without_a_command_timeout_is_flown():
     document = flight_config.document_of(flight_config.configuration_text(config()))
     short = {k: v for k, v in document.items() if k not in {Key.COMMAND_TIMEOUT, Key.VERSION}}
-    found = flight_config.from_document(short)
-    assert found.command_timeout is None
-    assert found.version == 'None'
+    recorded = flight_config.from_document(short)
+    assert recorded.command_timeout is None
+    assert recorded.version == 'None'
 
 
 # ---- events ----

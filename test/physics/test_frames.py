@@ -124,8 +124,8 @@ def test_the_imu_reads_the_turned_vectors():
         force = to_earth.T @ (acceleration - (0.0, 0.0, 9.81))
         force += np.cross(angular, arm) + np.cross(w, np.cross(w, arm))
         expected = np.concatenate([frames.map_from_paper(plastic @ x) for x in (w, force)])
-        found = imu.reading(s, tuple(acceleration), tuple(change), tuple(offset), 9.81)
-        assert_allclose(found, expected, atol=1e4 * ROUNDING)
+        reading = imu.reading(s, tuple(acceleration), tuple(change), tuple(offset), 9.81)
+        assert_allclose(reading, expected, atol=1e4 * ROUNDING)
 
 
 # ---- the angle of attack ----
@@ -257,14 +257,14 @@ def _is_number(node: ast.AST, value: float) -> bool:
 
 
 def test_no_other_module_turns_axes():
-    found = {
+    expressions = {
         (path.relative_to(PACKAGE).as_posix(), expression)
         for path in PACKAGE.rglob('*.py')
         if not path.relative_to(PACKAGE).as_posix().startswith(HOMES)
         for expression in turns(path.read_text(encoding='utf-8'))
     }
-    assert found - EXCEPTIONS.keys() == set(), 'use disc_sim_ros.physics.frames'
-    assert EXCEPTIONS.keys() - found == set(), 'exceptions without a case'
+    assert expressions - EXCEPTIONS.keys() == set(), 'use disc_sim_ros.physics.frames'
+    assert EXCEPTIONS.keys() - expressions == set(), 'exceptions without a case'
 
 
 @pytest.mark.parametrize(

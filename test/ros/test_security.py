@@ -27,7 +27,7 @@ ENCLAVE_FILES = (
 
 def opened(node, name):
     """Return the DDS topics that a node publishes and subscribes to, from the ROS graph."""
-    if name not in {found for found, _ in node.get_node_names_and_namespaces()}:
+    if name not in {running for running, _ in node.get_node_names_and_namespaces()}:
         return set(), set()
     publish = {f'rt{t}' for t, _ in node.get_publisher_names_and_types_by_node(name, '/')}
     subscribe = {f'rt{t}' for t, _ in node.get_subscriber_names_and_types_by_node(name, '/')}

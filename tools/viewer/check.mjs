@@ -1,4 +1,4 @@
-// Opens a bag with the layout in a browser, as a user would, takes pictures, and says what is seen.
+// Opens a bag with the layout in a browser, as a user would, takes pictures, and checks the panels.
 
 import { readFileSync } from 'node:fs';
 import { mkdir, mkdtemp, rm } from 'node:fs/promises';
@@ -173,7 +173,7 @@ function difference(a, b) {
   return a.filter((p, i) => p !== b[i]).length / a.length;
 }
 
-/** Print what the panels showed; say whether all is well. */
+/** Print what the panels showed; return true if all panels are filled. */
 function report(name, { seen, frames, errors }) {
   const times = Object.keys(seen);
   const lines = panels.map((id) => {

@@ -20,7 +20,7 @@ STABLE = 2.78  # largest step times rate, of a decay or an oscillation, that sta
 
 
 class Inputs(NamedTuple):
-    """What acts on a flight: held control inputs, the wind, and the noise that draws its gusts."""
+    """The inputs of a flight: constant control inputs, the wind, and the noise of its gusts."""
 
     control: Control
     wind: WindData

@@ -1,4 +1,4 @@
-"""What acts on the disc: control inputs and mean wind, as they begin, change and expire."""
+"""The inputs of the disc: control inputs and mean wind, as they begin, change and expire."""
 
 from dataclasses import replace
 import math

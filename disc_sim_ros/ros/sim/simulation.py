@@ -44,7 +44,7 @@ class Simulation:
     Attributes:
         clock: Simulated time.
         commands: The command topics.
-        inputs: What acts on the disc.
+        inputs: The control inputs and the wind.
         counts: Numbers of events so far.
         publishers: The topics that it publishes.
         config: The parameters in force; some of the newest wait for the next throw.
