@@ -73,6 +73,7 @@ class Bag:
             *folder.losses,
             *(loss for c in contents for loss in c.losses),
         )
+        self._all_contents = tuple(contents)  # unpacked files live as long as these
         self.contents = tuple(c if n == 0 else _without_repeats(c) for n, c in enumerate(contents))
         self.custom_data = dict(about.custom_data)
         self.topics = _topics(self.contents, about)

@@ -59,15 +59,11 @@ def repair(
         all_contents = read_files(folder, read)
     except OSError as error:
         raise BagError(f'{error.filename or source}: {reason(error)}') from None
-    whole = (
-        is_listed(folder, all_contents)
-        and not folder.losses
-        and all(c.complete for c in all_contents)
-    )
-    if not whole and not any(c.message_count or c.attachments for c in all_contents):
-        losses = [*folder.losses, *(loss for c in all_contents for loss in c.losses)]
-        why = f' ({losses[0]})' if losses else ''
-        raise BagError(f'{source}: nothing can be kept, there is no message in it{why}')
+    losses = [*folder.losses, *(loss for c in all_contents for loss in c.losses)]
+    sound = not losses and all(c.complete for c in all_contents)
+    whole = sound and is_listed(folder, all_contents)
+    if not whole and not any(c.message_count for c in all_contents):
+        _refuse_nothing(source, all_contents, losses)
     try:
         with whole_folder('OUT', target) as made:
             made.mkdir()
@@ -87,6 +83,14 @@ def repair(
         losses=tuple(repairer.losses),
         mended=tuple(repairer.mended),
     )
+
+
+def _refuse_nothing(source: Path, all_contents: Sequence[Contents], losses: list[Loss]) -> None:
+    """Refuse a bag without messages, but for the attachments of one that never had any."""
+    lost = [loss for loss in losses if loss.messages != 0]
+    if lost or not any(c.attachments for c in all_contents):
+        why = f' ({lost[0]})' if lost else ''
+        raise BagError(f'{source}: nothing can be kept, there is no message in it{why}')
 
 
 def _check(source: Path, target: Path) -> None:

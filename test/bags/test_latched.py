@@ -1,5 +1,6 @@
 """Each file of a split bag can begin with the latched messages of before."""
 
+import gc
 import os
 from pathlib import Path
 import shutil
@@ -12,6 +13,7 @@ from mcap.reader import make_reader
 import pytest
 from rosbags.rosbag2 import Reader
 import yaml
+import zstandard
 
 from bags.making import ODOMETRIES, ODOMETRY, START, STEP, STRING, everything, text, topic
 from disc_sim_ros.bags.reader import open_bag
@@ -98,6 +100,17 @@ def test_repeats_stay_repeats_in_a_repaired_bag(tmp_path):
     assert everything(open_bag(tmp_path / 'made')) == expected(400)
     with (tmp_path / 'made/made_1.mcap').open('rb') as file:
         assert next(make_reader(file).iter_messages())[1].topic == '/configuration'
+
+
+def test_repeats_of_compressed_files_are_left_out(tmp_path):
+    write(tmp_path / 'bag', 400, max_duration=0.1)
+    for path in (tmp_path / 'bag').glob('*.mcap'):
+        packed = zstandard.ZstdCompressor().compress(path.read_bytes())
+        path.with_name(f'{path.name}.zstd').write_bytes(packed)
+        path.unlink()
+    bag = open_bag(tmp_path / 'bag')
+    gc.collect()
+    assert everything(bag) == expected(400)
 
 
 def test_a_split_by_hand_repeats_when_the_next_message_comes(tmp_path):

@@ -282,6 +282,18 @@ def test_a_full_disk_is_reported(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ['bag']
 
 
+def test_attachments_of_a_recorder_that_was_killed_before_its_first_message_are_kept(tmp_path):
+    bag = BagWriter(tmp_path / 'bag')
+    bag.attach('a.txt', 'text/plain', b'text')
+    bag.flush()
+    content = (tmp_path / 'bag/bag_0.mcap').read_bytes()
+    bag.close()
+    (tmp_path / 'x.mcap').write_bytes(content)
+    report = repair(tmp_path / 'x.mcap', tmp_path / 'made')
+    assert (report.message_count, report.attachments) == (0, 1)
+    assert [a.data for a in open_bag(tmp_path / 'made').attachments] == [b'text']
+
+
 def test_repair_of_an_empty_file_is_refused(tmp_path):
     (tmp_path / 'x.mcap').touch()
     with pytest.raises(BagError, match='is empty'):
