@@ -71,11 +71,19 @@ def test_fig_5_is_met_with_the_damping_that_the_page_says():
     }
 
 
-def test_the_second_integration_is_as_close_as_the_page_says():
-    limit = float(re.search(r'at most ([\d.]+) mm', PAGE)[1]) * 1e-3
-    for key in ('4', 'models', '12'):  # the three farthest, all with a wobble
+def test_the_second_integration_is_within_the_bound_of_the_page():
+    """The page states a bound, not a measured digit.
+
+    DOP853 chooses its steps: their places relative to the corners of the table depend on the last
+    bits of sines and cosines, and so on the processor. On those tried the largest distance is
+    0.017 to 0.021 mm; the bound has a margin of five, and is a hundredth of what the figures
+    promise.
+    """
+    bound = float(re.search(r'at most ([\d.]+) mm', PAGE)[1]) * 1e-3
+    assert bound == pytest.approx(report.CLOSE / 100)
+    for key in ('4', 'models', '12'):  # the largest distances, all of flights with a wobble
         flight = FIGURES[key].example(computed(key)).flight
-        assert crosscheck.largest_distance(flight) < limit
+        assert crosscheck.largest_distance(flight) < bound
 
 
 @pytest.mark.parametrize('key', ['5', '6', 'roll_rate'])
