@@ -1,4 +1,4 @@
-"""How the figures are drawn: labels, captions, equal scales, colours, discs. Not their looks."""
+"""Drawing of the figures: labels, captions, equal scales, colours and discs."""
 
 import io
 
@@ -57,18 +57,18 @@ def contrast(one, other):
 
 
 @pytest.mark.parametrize('look', LOOKS.values(), ids=LOOKS)
-def test_colours_stand_out_from_their_background(look):
+def test_colours_have_contrast_with_their_background(look):
     assert contrast(look.ink, look.face) > 7.0  # WCAG 2.1, text, AAA
     for colour in (look.printed, look.tenth, look.third, look.fourth):
         assert contrast(colour, look.face) > 3.0  # WCAG 2.1, graphics
     family = style.family(range(8), look)
-    # The bright end of a family on white has less; its curves have discs and stand in order.
+    # The bright end of a family on white has less; its curves have discs and are in order.
     assert min(contrast(colour, look.face) for colour in family) > 2.0
     brightness = [luminance(colour) for colour in family]
-    assert brightness == sorted(brightness)  # told apart in grey as well
+    assert brightness == sorted(brightness)  # distinct in grey as well
 
 
-def test_a_picture_is_the_same_at_every_run_and_has_its_background():
+def test_a_picture_is_the_same_in_every_run_and_has_its_background():
     for look, kinds in ((LIGHT, ('png', 'svg')), (DARK, ('png',))):
         figures = [FIGURES['3'].plot(computed('3'), look) for _ in range(2)]
         for kind in kinds:
@@ -83,7 +83,7 @@ def test_a_picture_is_the_same_at_every_run_and_has_its_background():
                 assert first.startswith(b'<?xml')
 
 
-def test_discs_are_seen_as_they_lie():
+def test_discs_are_projected_as_they_lie():
     setup = Setup(disc=conditions.frisbee())
     launch = Launch(pitch=0.0, roll=0.0, spin=30.0)
     t = fly(launch, setup, duration=0.02, ground=False, sample_rate=100.0).trajectory

@@ -1,4 +1,4 @@
-"""docs/figures.md says what the figures give."""
+"""docs/figures.md agrees with the figures."""
 
 from pathlib import Path
 import re
@@ -30,13 +30,12 @@ def row(what):
 
 
 def test_the_verdicts_are_those_of_the_table():
-    summary_report = report.Report((), judged(), dark=True)
-    for sentence in summary_report.summary():
+    for sentence in report.Report((), judged(), dark=True).summary():
         assert sentence in PAGE
 
 
-def test_the_rows_are_what_the_figures_give():
-    """Each number of the page, as rounded there."""
+def test_the_rows_hold_the_numbers_of_the_figures():
+    """Each number of the page, rounded as there."""
     printed, corrected = computed('4').printed[1], computed('4').corrected[1]
     for curve in (printed, corrected):
         assert f'{fig04_flight_f2302.wobble(curve):.1f}°' in row('Fig. 4')
@@ -63,7 +62,7 @@ def test_the_rows_are_what_the_figures_give():
     assert f'{depths[0.0]:.1f} m without gravity, {depths[9.81]:.1f} m with' in row('Fig. 12')
 
 
-def test_fig_5_is_met_with_the_damping_that_the_page_says():
+def test_fig_5_is_reproduced_with_the_damping_of_the_page():
     results = [r for r in judged() if r.statement.says == 'rms of alpha from the black curve']
     assert dict(zip(conditions.SHARES, results[0].met, strict=True)) == {
         PRINTED: False,
@@ -88,7 +87,7 @@ def test_the_second_integration_is_within_the_bound_of_the_page():
 
 @pytest.mark.parametrize('key', ['5', '6', 'roll_rate'])
 @pytest.mark.parametrize('look', style.LOOKS.values(), ids=style.LOOKS)
-def test_the_pictures_are_those_of_the_program(key, look):
+def test_the_pictures_have_the_size_that_the_program_draws(key, look):
     name = figure_files.picture(key, 'png', look)
     assert f'figures/{name}' in PAGE
     kept = DOCS / 'figures' / name

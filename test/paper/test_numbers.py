@@ -1,4 +1,4 @@
-"""The figures by their numbers: what each draws, against docs/deviations.md and simple physics."""
+"""The numbers of the figures, against docs/deviations.md and simple physics."""
 
 import csv
 import io
@@ -29,7 +29,7 @@ def rows(key):
     return list(csv.DictReader(io.StringIO(FIGURES[key].table(computed(key)))))
 
 
-def test_fig_3_draws_the_table_that_flies():
+def test_fig_3_draws_the_table_of_the_disc():
     data = computed('3')
     for alpha in (-5.0, 0.0, 2.5, 40.0):
         drawn = data.table[data.alpha == alpha][0]
@@ -66,16 +66,16 @@ def test_fig_4_has_both_launches():
     assert all(curve.flight.landed for curve in computed('4').curves)
 
 
-def test_fig_5_is_as_near_to_the_black_curves_as_documented():
+def test_fig_5_has_the_documented_distance_from_the_black_curves():
     data = computed('5')
-    distances = {curve.share: fig05_typical_flight.rms(curve, data.read) for curve in data.curves}
+    rms = {curve.share: fig05_typical_flight.rms(curve, data.read) for curve in data.curves}
     # docs/deviations.md, all 21 rows, constant spin: half the last digit.
     for share, expected in (
         (PRINTED, (0.20, 1.81, 1.12)),
         (TENTH, (0.10, 0.57, 0.24)),
         (HUNDREDTH, (0.10, 0.42, 0.21)),
     ):
-        three = [distances[share][name] for name in ('V', 'alpha', 'lambda')]
+        three = [rms[share][name] for name in ('V', 'alpha', 'lambda')]
         assert three == pytest.approx(expected, abs=0.005)
     assert all(fig05_typical_flight.rms(c, data.read, '_lin')['phi'] > 20.0 for c in data.linear)
 
@@ -94,11 +94,11 @@ def test_fig_6_launches_are_those_of_the_text():
         assert flight.trajectory.advance_ratio[0] == pytest.approx(ratio)
     assert {round(f.launch.spin * 0.275 / 38.0, 9) for f in pitches} == {1.1}
     assert {round(f.launch.spin * 0.275 / 38.0, 9) for f in alphas} == {0.5}
-    for flight in alphas:  # thrown horizontally whatever the pitch
+    for flight in alphas:  # the velocity is horizontal at any pitch
         assert flight.trajectory.velocity[0] == pytest.approx((19.0, 0.0, 0.0), abs=1e-12)
     assert {f.launch.pitch for f in rolls} == {20.0}
     assert all(f.landed for f in rolls)
-    # The less spin the more it turns, as the text says.
+    # The less spin, the more it turns, as the text says.
     sideways = [f.end.Y / f.end.X for f in ratios[2:]]
     assert sideways == sorted(sideways, reverse=True)
 
@@ -116,7 +116,7 @@ def test_figs_7_and_8_have_their_best_pitches():
     assert FIGURES['8'].compute is fig07_range.compute
 
 
-def test_fig_9_is_an_s_that_crosses_the_axis_once():
+def test_fig_9_crosses_the_axis_at_the_interpolated_rolls():
     data = computed('9')
     for ratio in (0.2, 0.25, 0.29, 0.5):
         for share in conditions.SHARES:
@@ -128,17 +128,17 @@ def test_fig_9_is_an_s_that_crosses_the_axis_once():
     assert data.crossing(0.5, PRINTED) == pytest.approx(-2.7, abs=0.05)
 
 
-def test_fig_10_falls_together():
+def test_the_flights_of_fig_10_coincide():
     data = computed('10')
     assert fig10_similarity.spread(data.first) < 0.005
     assert fig10_similarity.spread(data.second) < 0.005
-    for curve in data.first:  # lift is weight, whatever the speed
+    for curve in data.first:  # lift equals weight at any speed
         disc, speed = curve.flight.setup.disc, curve.flight.launch.speed
         lift = 0.5 * 1.225 * speed**2 * disc.area * disc.linear.CL_alpha * math.radians(2.0)
         assert lift == pytest.approx(disc.mass * 9.81, rel=0.01)
     for curve in data.second:
         assert abs(fig10_similarity.law(curve, printed=True)) == pytest.approx(0.47)
-    # It is the ratio that counts: half of it, and the flights part.
+    # At half the ratio the flights differ.
     other = fig10_similarity.launched(fig10_similarity.plate(), 15.7, 2.0)
     parted = (data.first[1], conditions.Curve('half', 0.0, other))
     assert fig10_similarity.spread(parted) > 0.05
@@ -167,19 +167,19 @@ def test_fig_12_ends_where_documented(gravity, share, depth):
     assert pytest.approx(depth, rel=0.01) == curve.flight.end.Z
 
 
-def test_models_are_as_far_apart_as_documented():
+def test_models_have_the_documented_distances():
     data = computed('models')
     at_4 = round(4.0 * conditions.RATE)
     assert data.apart('constant_spin', PRINTED)[at_4] == pytest.approx(0.068, abs=0.0005)
     assert data.apart('precession', PRINTED)[at_4] == pytest.approx(0.090, abs=0.0005)
     assert np.all(data.seconds > 0.0)
-    assert np.all(data.seconds < 0.1)  # a thousand times what it takes
-    # More spin never allows a longer step, and dropping nutation never asks for a shorter one.
+    assert np.all(data.seconds < 0.1)  # a thousand times the usual run time
+    # More spin never allows a longer step, and a model without nutation never needs a shorter one.
     assert np.all(np.diff(data.step, axis=1) <= 0.0)
     assert np.all(data.step[2] >= data.step[0])
 
 
-def test_the_roll_rate_law_has_a_four():
+def test_the_roll_rate_law_has_the_factor_four():
     data = computed('roll_rate')
     factor = roll_rate_law.factor(data)
     assert factor[-1] == pytest.approx(4.0, rel=0.01)  # AdvR 3.8; docs/deviations.md has 0.4 %
@@ -194,7 +194,7 @@ def _law(data):
 
 
 @pytest.mark.parametrize('key', FIGURES)
-def test_each_csv_has_units_and_the_samples(key):
+def test_each_csv_has_samples_and_units_in_its_header(key):
     samples = rows(key)
     assert len(samples) > 10
     unitless = {'curve', 'damping_share', 'AdvR', 'model', 'row', 'time_g_by_V'}
@@ -205,7 +205,7 @@ def test_each_csv_has_units_and_the_samples(key):
         assert known or name.endswith(units + without), name
 
 
-def test_the_csv_holds_what_is_drawn():
+def test_the_csv_holds_the_drawn_curves():
     data = computed('5')
     samples = [row for row in rows('5') if row['curve'] == 'table, damping as printed']
     assert len(samples) == len(data.curves[0].t) == 401

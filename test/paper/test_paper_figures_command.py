@@ -1,4 +1,4 @@
-"""`paper_figures` as a person runs it."""
+"""`paper_figures` as a command."""
 
 import csv
 import os
@@ -47,7 +47,7 @@ def made(tmp_path_factory):
     return folder / 'out', done.stdout
 
 
-def test_it_writes_figures_tables_and_reports_and_nothing_else(made):
+def test_it_writes_only_figures_tables_and_reports(made):
     folder, _ = made
     names = {path.name for path in folder.iterdir()}
     assert names == {
@@ -60,7 +60,7 @@ def test_it_writes_figures_tables_and_reports_and_nothing_else(made):
         assert len(list(csv.DictReader(file))) == 12
 
 
-def test_it_shows_progress_and_how_it_came_out(made):
+def test_it_shows_progress_and_the_outcome(made):
     _, printed = made
     lines = printed.splitlines()
     assert [line[:6] for line in lines[1:4]] == ['[ 1/3]', '[ 2/3]', '[ 3/3]']
@@ -71,7 +71,7 @@ def test_it_shows_progress_and_how_it_came_out(made):
     assert re.search(r'^wrote out/report.html .* in \d+ s$', printed, re.MULTILINE)
 
 
-def test_the_reports_are_whole(made):
+def test_the_reports_are_complete(made):
     folder, _ = made
     html = (folder / 'report.html').read_text(encoding='utf-8')
     markdown = (folder / 'report.md').read_text(encoding='utf-8')
@@ -95,12 +95,12 @@ def test_the_reports_are_whole(made):
     assert len(rows) == html.count('<tr>')
 
 
-def test_a_flight_that_is_off_is_not_called_close():
+def test_a_distant_second_integration_is_reported():
     far = WrittenFigure('7', 'Fig. 7: x', 'c', ('f.',), ('fig07.csv',), 'θ 10°', 0.02, 1.0)
-    judged = report.Report((far,), None, dark=True)
-    assert 'NOT within 1 cm' in ' '.join(judged.summary())
-    assert judged.checks()[0][-1] == 'NOT within 1 cm'
-    assert 'NOT within 1 cm' in report.html(judged)
+    written = report.Report((far,), None, dark=True)
+    assert 'NOT within 1 cm' in ' '.join(written.summary())
+    assert written.checks()[0][-1] == 'NOT within 1 cm'
+    assert 'NOT within 1 cm' in report.html(written)
 
 
 def test_light_only_and_svg_in_one_process(tmp_path, capsys):
@@ -129,7 +129,9 @@ def test_light_only_and_svg_in_one_process(tmp_path, capsys):
         (['extra'], 'unrecognized arguments: extra'),
     ],
 )
-def test_bad_input_is_one_line_and_code_2(arguments, says, tmp_path, monkeypatch, capsys):
+def test_bad_input_is_refused_in_one_line_with_code_2(
+    arguments, says, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     Path('file').write_text('', encoding='utf-8')
     with pytest.raises(SystemExit) as ended:
@@ -146,13 +148,13 @@ def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
     def refuse(**_):
         raise PermissionError(13, 'Permission denied')
 
-    # Root may write everywhere, so the refusal itself is played.
+    # Root may write everywhere, so the refusal is simulated.
     monkeypatch.setattr(paper_figures.tempfile, 'TemporaryFile', refuse)
     with pytest.raises(ConfigError, match=r'cannot write there \(Permission denied\)'):
         paper_figures.writable_folder(str(tmp_path))
 
 
-def test_a_full_disk_is_one_line_and_code_1(tmp_path, monkeypatch, capsys):
+def test_a_full_disk_is_reported_in_one_line_with_code_1(tmp_path, monkeypatch, capsys):
     def full(*_, **__):
         raise OSError(28, 'No space left on device')
 
@@ -161,12 +163,12 @@ def test_a_full_disk_is_one_line_and_code_1(tmp_path, monkeypatch, capsys):
     assert 'No space left on device' in capsys.readouterr().err
 
 
-def test_the_parts_are_those_of_the_figures():
+def test_the_parts_of_the_command_are_all_figures_and_the_statements():
     assert paper_figures.PARTS == run.PARTS
     assert set(paper_figures.SLOW) < set(run.PARTS)
 
 
-def test_help_is_quick_and_needs_neither_ros_nor_matplotlib():
+def test_help_imports_neither_ros_nor_matplotlib():
     code = (
         'import sys\n'
         'from disc_sim_ros.cli import paper_figures\n'
@@ -184,7 +186,7 @@ def test_help_is_quick_and_needs_neither_ros_nor_matplotlib():
         assert word in done.stdout
 
 
-def test_ctrl_c_ends_it_with_130_and_no_traceback(tmp_path):
+def test_ctrl_c_ends_it_with_130_without_a_traceback(tmp_path):
     program = subprocess.Popen(
         [*PROGRAM, '--out', 'out'], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,

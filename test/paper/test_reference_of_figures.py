@@ -1,7 +1,7 @@
-"""One flight of each figure against two integrations that are not the package's.
+"""One flight of each figure against two other integrations.
 
 The first is test/reference, written from the paper alone: axes that spin, a rotation matrix, steps
-from corner to corner of the table. The second is `experiments.independent`, which every run of
+from corner to corner of the table. The second is `paper.crosscheck`, which every run of
 `paper_figures` repeats.
 """
 
@@ -20,11 +20,11 @@ from reference.reference_flight import reference_flight
 pytestmark = pytest.mark.xdist_group('figures')  # computed once
 
 CLOSE = 0.01  # m, what the figures promise
-STEP = 1e-3  # s, of the reference: five times its own, still 5e-6 m from it by its docstring
+STEP = 1e-3  # s; five times the default of the reference, with an error of 5e-6 m (docstring)
 
 
 def by_reference(flight):
-    """The positions of a flight by test/reference, in map axes."""
+    """Return a flight as test/reference integrates it, in map axes."""
     disc, launch, setup = flight.setup.disc, flight.launch, flight.setup
     described = {
         'mass': disc.mass,
@@ -88,8 +88,8 @@ def test_a_flight_of_each_figure_agrees_with_both(key):
     [{'inertia_diametral': 1.3e-3}, {'C_Lp': -0.5}, {'C_Nr': -5e-3}, {'area': 0.0595}],
     ids=str,
 )
-def test_the_independent_integration_notices_another_disc(changes):
-    """It is worth something only if it can disagree: fly one disc, integrate another."""
+def test_the_second_integration_notices_another_disc(changes):
+    """The check must be able to fail: fly one disc, integrate another."""
     launch = Launch(roll_rate=8.0)
     flown = fly(
         launch, Setup(disc=conditions.frisbee()), duration=3.0, ground=False, sample_rate=50.0
@@ -100,7 +100,7 @@ def test_the_independent_integration_notices_another_disc(changes):
 
 
 @pytest.mark.parametrize('options', [{'model': 'precession'}, {'moment_axes': 'wind'}], ids=str)
-def test_the_independent_integration_refuses_what_it_does_not_know(options):
+def test_the_second_integration_refuses_other_models_and_axes(options):
     flight = fly(Launch(), Setup(disc=conditions.frisbee(), **options), sample_rate=10.0)
     with pytest.raises(ValueError, match='axes 3'):
         crosscheck.largest_distance(flight)

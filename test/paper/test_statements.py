@@ -1,4 +1,4 @@
-"""The table of statements: its rule, and that it says plainly what is not reproduced."""
+"""The table of statements: its rule, and its verdicts."""
 
 import dataclasses
 
@@ -86,8 +86,8 @@ def statement(number, printed, tenth, **options):
     ],
 )
 def test_the_verdict_follows_from_the_numbers(case, verdict, says):
-    result = judge(case)
-    assert (result.verdict, result.detail) == (verdict, says)
+    outcome = judge(case)
+    assert (outcome.verdict, outcome.detail) == (verdict, says)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_each_statement_is_complete(statement):
     assert statement.where
     assert statement.says
     if statement.number[:1] in {'<', '>'}:
-        assert statement.words  # a bound is our reading of words, and has to say so
+        assert statement.words  # a bound is our reading of these words
         assert statement.tolerance is None
     if statement.tolerance is not None:
         assert statement.reason
@@ -106,7 +106,7 @@ def test_each_statement_is_complete(statement):
     assert (statement.upper is None) == (not statement.open_value)
 
 
-def test_what_differs_says_by_how_much_and_why(results):
+def test_each_difference_has_an_amount_and_a_cause(results):
     differing = [r for r in results if r.verdict == DIFFERS]
     assert len(differing) > 10  # the paper has errors, see docs/deviations.md
     for r in differing:
@@ -115,8 +115,8 @@ def test_what_differs_says_by_how_much_and_why(results):
         assert len(why) > 10, r
 
 
-def test_known_differences_are_told(results):
-    """Each is in docs/deviations.md or follows from a fine grid; none may turn out as met."""
+def test_known_differences_are_reported(results):
+    """Each is in docs/deviations.md or follows from a fine grid; none may count as reproduced."""
     for where, says in (
         ('Eqn 64', 'p V / g'),
         ('Eqns 53, 54', 'p by M'),
@@ -132,7 +132,7 @@ def test_known_differences_are_told(results):
         assert result(results, where, says).verdict == DIFFERS
 
 
-def test_known_agreements_are_told(results):
+def test_known_agreements_are_reported(results):
     for where, says in (
         ('Text on Fig. 5', 'least speed'),
         ('Text on Fig. 5', 'largest angle'),
@@ -144,13 +144,13 @@ def test_known_agreements_are_told(results):
         assert result(results, where, says).verdict == REPRODUCED
 
 
-def test_the_printed_damping_does_not_meet_fig_5_and_the_table_says_so(results):
+def test_the_printed_damping_does_not_reproduce_fig_5(results):
     rms = [r for r in results if r.statement.says == 'rms of alpha from the black curve']
     assert rms[0].met == (False, True)
     assert rms[0].detail.startswith('with 10 % damping')
 
 
-def test_what_was_chosen_to_meet_a_statement_counts_as_no_evidence(results):
+def test_a_number_that_is_an_input_counts_as_no_evidence(results):
     assert result(results, 'implementation', 'spin lost').verdict == TAKEN
     assert result(results, 'Fig. 10, caption', 'p_hat of the second').verdict == TAKEN
 
@@ -169,7 +169,7 @@ def test_the_table_counts_every_statement(results):
     assert len(table.csv(results).splitlines()) == len(results) + 1
 
 
-def test_an_unreachable_number_is_far(results):
+def test_infinity_is_infinitely_far_from_a_number(results):
     assert rule.distance(result(results, 'Eqn 64', 'p V / g').statement, float('inf')) == float(
         'inf'
     )
