@@ -1,4 +1,4 @@
-"""What the tests of commands share: `fly` in this process."""
+"""Fixtures of the tests of commands: `fly` in this process."""
 
 from collections.abc import Callable
 import json
@@ -13,7 +13,7 @@ from disc_sim_ros.physics.launch import Launch
 
 @pytest.fixture(scope='module')
 def compiled():
-    """Compile first, so that no test sees the note about it."""
+    """Compile first, so that no test gets the note about it."""
     flight.fly(Launch(), flight.Setup(disc=disc_file.load_disc('frisbee')))
 
 
@@ -33,7 +33,7 @@ def fly(capsys) -> Callable[..., Result]:
 
 @pytest.fixture
 def document(fly) -> Callable[..., dict]:
-    """Run `fly --json` and return what it printed."""
+    """Run `fly --json` and return its document."""
 
     def run(*arguments: object) -> dict:
         result = fly('--json', *arguments)

@@ -1,4 +1,4 @@
-"""`fly` as a command: run in this process or in one of its own, and what it left behind."""
+"""`fly` as a command: run in this process or in one of its own, and its results."""
 
 from dataclasses import dataclass
 import math
@@ -32,7 +32,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Result:
-    """What a run of `fly` left behind."""
+    """Exit code, stdout and stderr of a run of `fly`."""
 
     code: int
     out: str
@@ -47,13 +47,13 @@ def start(*arguments: object, **options) -> subprocess.CompletedProcess:
 
 
 def environment(**changes: str | None) -> dict[str, str]:
-    """The environment with changes; None takes a variable away."""
+    """Return the environment with changes; None removes a variable."""
     merged = {**os.environ, **changes}
     return {name: value for name, value in merged.items() if value is not None}
 
 
 def refused(result: Result, *fragments: str) -> None:
-    """The run ended with code 2 and one line that holds the fragments."""
+    """Check that the run ended with code 2 and one line with the fragments."""
     assert result.code == 2
     assert result.out == ''
     assert re.fullmatch(r'fly: error: [^\n]+\n', result.err)
@@ -62,7 +62,7 @@ def refused(result: Result, *fragments: str) -> None:
 
 
 def paper_velocity(launch: dict) -> np.ndarray:
-    """The velocity at release in the paper's earth axes, from scipy's rotations."""
+    """Return the velocity at release in the paper's earth axes, from scipy's rotations."""
     alpha = math.radians(launch['angle_of_attack_deg'])
     beta = math.radians(launch['sideslip_deg'])
     uvw = [math.cos(alpha) * math.cos(beta), math.cos(alpha) * math.sin(beta), math.sin(alpha)]

@@ -75,9 +75,9 @@ def parabola_bag(tmp_path, **changes):
 
 
 def test_a_steered_flight_in_gusts_is_computed_again_to_the_bit(document, steered):
-    code, found = document(steered, '--verify')
+    code, summary = document(steered, '--verify')
     assert code == 0
-    (disc,) = found['discs']
+    (disc,) = summary['discs']
     first, second = disc['flights']
     for flight in (first, second):
         verified = flight['verification']
@@ -102,9 +102,9 @@ def test_a_steered_flight_in_gusts_is_computed_again_to_the_bit(document, steere
 
 
 def test_the_public_function_finds_the_flights_of_the_command(document, steered):
-    _, found = document(steered)
+    _, summary = document(steered)
     analyses = disc_sim_ros.analyse_bag(steered)
-    flights = [flight for disc in found['discs'] for flight in disc['flights']]
+    flights = [flight for disc in summary['discs'] for flight in disc['flights']]
     assert [bag_report.document(a)['range_m'] for a in analyses] == [f['range_m'] for f in flights]
     assert [a.passed for a in analyses] == [True, True]
     assert disc_sim_ros.analyse_bag(steered, '/odom')[0].verdict == analyses[0].verdict
@@ -123,9 +123,9 @@ def test_a_bag_that_ends_between_the_landing_and_the_message_that_shows_it(
     capsys.readouterr()
     whole = [m.data for m in open_bag(tmp_path / 'bag').raw(['/odom'])]
     copy(tmp_path / 'bag', tmp_path / 'part', lambda message: message.data != whole[-1])
-    code, found = document(tmp_path / 'part', '--verify')
+    code, summary = document(tmp_path / 'part', '--verify')
     assert code == 0
-    (flight,) = found['discs'][0]['flights']
+    (flight,) = summary['discs'][0]['flights']
     assert flight['messages']['count'] == len(whole) - 1
     again = flight['verification']['re_flight']
     assert again['identical_messages'] == len(whole) - 1
@@ -140,9 +140,9 @@ def test_it_agrees_with_fly(document, capsys, tmp_path):
     assert re.search(r'  wrote   \S+/bag: \d+ messages of \d+ topics', capsys.readouterr().out)
     assert fly.main([*flags, '--json']) == 0
     flown = json.loads(capsys.readouterr().out)
-    code, found = document(tmp_path / 'bag', '--verify')
+    code, summary = document(tmp_path / 'bag', '--verify')
     assert code == 0
-    (flight,) = found['discs'][0]['flights']
+    (flight,) = summary['discs'][0]['flights']
     assert flight['landing_position_m'] == flown['landing_position_m']
     assert flight['flight_time_s'] == flown['flight_time_s']
     for key in ('range_m', 'drift_m', 'end_spin_rad_s'):
@@ -155,12 +155,12 @@ def test_it_agrees_with_fly(document, capsys, tmp_path):
 
 def test_a_bag_without_a_command_differs_from_a_known_time_on(analyse, document, part):
     bag = part(lambda m: m.topic != '/applied_coefficients', custom_data={'drops': '/odom 3'})
-    code, found = document(bag, '--verify')
+    code, summary = document(bag, '--verify')
     assert code == analyse_bag.DIFFERENT == 3
-    first, second = (f['verification']['re_flight'] for f in found['discs'][0]['flights'])
+    first, second = (f['verification']['re_flight'] for f in summary['discs'][0]['flights'])
     assert not first['exact']
     assert second['exact']
-    # Commanded 223.4 ms after START, released at 100 or a message later, seen a message later.
+    # The command acts 223.4 ms after START, the release at 100 or a message later.
     assert 0.116 < first['first_difference_s'] < 0.1234 + 1 / 150
     assert first['largest_difference']['position.x_m'] > 0.01
     assert 'drops: /odom 3' in first['doubts']
@@ -174,9 +174,9 @@ def test_a_bag_without_a_command_differs_from_a_known_time_on(analyse, document,
 def test_lost_odometry_is_counted_and_the_flight_still_verified(document, part):
     lost = iter(range(10_000))
     bag = part(lambda m: m.topic != '/odom' or next(lost) not in {40, 41, 60})
-    code, found = document(bag, '--verify')
+    code, summary = document(bag, '--verify')
     assert code == 0
-    messages = found['discs'][0]['flights'][0]['messages']
+    messages = summary['discs'][0]['flights'][0]['messages']
     assert messages['missing'] == 3
     assert messages['longest_gap_s'] == pytest.approx(3 / 150, abs=1e-8)
 
@@ -189,9 +189,9 @@ def test_a_bag_that_begins_in_flight_is_reported_with_its_gap(document, part):
     def late(m):
         return m.log_time >= begin or m.topic in {'/release', '/configuration'}
 
-    code, found = document(part(late), '--verify')
+    code, summary = document(part(late), '--verify')
     assert code == 3
-    first = found['discs'][0]['flights'][0]
+    first = summary['discs'][0]['flights'][0]
     assert first['starts_late_s'] == pytest.approx(0.3, abs=0.01)
     assert first['launch']['speed_m_s'] == pytest.approx(14.0)  # as configured
     (doubt,) = first['verification']['re_flight']['doubts']
@@ -216,13 +216,13 @@ def test_a_change_of_the_wind_profile_is_named(document, tmp_path):
             lambda: made.simulation.configure(configuration(bags.PARAMETERS | rougher))
         )
         changed = [Parameter(name='wind.roughness_length')]
-        told = ParameterEvent(node='/sim_node', changed_parameters=changed)
+        event = ParameterEvent(node='/sim_node', changed_parameters=changed)
         now = made.simulation.clock.now
-        writer.write(events._topic_id, serialize_message(told), now, now)
+        writer.write(events._topic_id, serialize_message(event), now, now)
         made.go(0.2)
-    code, found = document(tmp_path / 'bag', '--verify')
+    code, summary = document(tmp_path / 'bag', '--verify')
     assert code == 3
-    again = found['discs'][0]['flights'][0]['verification']['re_flight']
+    again = summary['discs'][0]['flights'][0]['verification']['re_flight']
     assert 0.19 < again['first_difference_s'] < 0.22
     assert any('profile of the wind was changed' in doubt for doubt in again['doubts'])
 
@@ -237,9 +237,9 @@ def test_topics_missing_in_the_bag_are_named(document, part, steered, tmp_path):
         ids = {i.topic.name: writer.add(i.topic) for i in bag.topics if i.topic.name in kept}
         for m in bag.raw(kept):
             writer.write(ids[m.topic], m.data, m.log_time, m.publish_time)
-    code, found = document(tmp_path / 'few', '--verify')
+    code, summary = document(tmp_path / 'few', '--verify')
     assert code == 3
-    doubts = found['discs'][0]['flights'][0]['verification']['re_flight']['doubts']
+    doubts = summary['discs'][0]['flights'][0]['verification']['re_flight']['doubts']
     assert 'not recorded: applied_moment, applied_coefficients, applied_wind' in doubts
 
 
@@ -271,16 +271,16 @@ def test_two_discs_on_one_topic_have_a_report_each(document, analyse, tmp_path):
                     ids[info.topic.name] = writer.add(info.topic)
             for m in bag.raw():
                 writer.write(ids[m.topic], m.data, m.log_time, m.publish_time)
-    code, found = document(tmp_path / 'both', '--verify')
+    code, summary = document(tmp_path / 'both', '--verify')
     assert code == 0
-    assert [(d['disc'], d['child_frame']) for d in found['discs']] == [
+    assert [(d['disc'], d['child_frame']) for d in summary['discs']] == [
         ('red', 'red/disc'),
         ('blue', 'blue/disc'),
     ]
-    seeds = [d['flights'][0]['setup']['wind']['seed'] for d in found['discs']]
+    seeds = [d['flights'][0]['setup']['wind']['seed'] for d in summary['discs']]
     assert seeds == [bags.PARAMETERS['wind.seed'], 4]
-    code, found = document(tmp_path / 'both', '--disc', 'blue')
-    assert [d['disc'] for d in found['discs']] == ['blue']
+    code, summary = document(tmp_path / 'both', '--disc', 'blue')
+    assert [d['disc'] for d in summary['discs']] == ['blue']
     code, _, err = analyse(tmp_path / 'both', '--disc', 'green')
     assert code == 2
     assert 'choose from red, blue' in err
@@ -291,9 +291,9 @@ def test_two_discs_on_one_topic_have_a_report_each(document, analyse, tmp_path):
 
 def test_a_bag_of_another_program_is_measured_and_its_kinematics_checked(document, tmp_path):
     parabola = Parabola()
-    code, found = document(parabola_bag(tmp_path), '--verify')
+    code, summary = document(parabola_bag(tmp_path), '--verify')
     assert code == 0
-    (disc,) = found['discs']
+    (disc,) = summary['discs']
     assert (disc['topic'], disc['child_frame']) == ('/thing/odometry', 'body')
     (flight,) = disc['flights']
     launch = flight['launch']
@@ -333,9 +333,9 @@ def test_topics_with_our_names_and_other_contents_are_tolerated(document, tmp_pa
             '/flight_events': [(START, foreign.text('landed'))],
         },
     )
-    code, found = document(bag, '--verify')
+    code, summary = document(bag, '--verify')
     assert code == 0
-    (flight,) = found['discs'][0]['flights']
+    (flight,) = summary['discs'][0]['flights']
     assert 'no configuration' in flight['verification']['not_flown_again']
 
 
@@ -343,8 +343,8 @@ def test_nan_in_a_message_is_tolerated(document, tmp_path):
     parabola = Parabola()
     parabola.position[40] = np.nan
     bag = foreign.write(tmp_path / 'bag', {'/odom': parabola.odometry()})
-    _, found = document(bag, '--verify')
-    assert [f['ended'] for f in found['discs'][0]['flights']] == ['rest', 'end of the bag']
+    _, summary = document(bag, '--verify')
+    assert [f['ended'] for f in summary['discs'][0]['flights']] == ['rest', 'end of the bag']
 
 
 # ---- output and refusals ----

@@ -1,4 +1,4 @@
-"""`demo` as its users meet it: real processes, a real bag, nothing left behind."""
+"""`demo` as a command: real processes, a real bag, and no process left running."""
 
 import json
 import os
@@ -19,7 +19,7 @@ from disc_sim_ros.cli import analyse_bag, demo, fly
 pytestmark = pytest.mark.ros
 
 EXECUTABLE = Path(sys.executable).with_name('demo')
-DEADLINE = 120.0  # s for what takes ten on an idle machine
+DEADLINE = 120.0  # s; ten on an idle machine
 SHORT = ['--height', '0.5', '--pitch', '-2', '--spin', '40']
 
 
@@ -56,8 +56,8 @@ def is_running(pid):
     return state != 'Z'
 
 
-def test_it_throws_records_verifies_and_tells(tmp_path, capsys):
-    """Steered, in wind and gusts: the flight of `fly`, recorded whole."""
+def test_it_throws_records_verifies_and_reports(tmp_path, capsys):
+    """Steered, in wind and gusts: the flight of `fly`, recorded completely."""
     flags = [
         *SHORT,
         '--control',
@@ -91,15 +91,15 @@ def test_it_throws_records_verifies_and_tells(tmp_path, capsys):
     assert len(out.splitlines()) < 24  # one screen
 
     assert analyse_bag.main([str(bag), '--json', '--verify']) == 0
-    told = json.loads(capsys.readouterr().out)
-    (flight,) = told['discs'][0]['flights']
+    document = json.loads(capsys.readouterr().out)
+    (flight,) = document['discs'][0]['flights']
     assert fly.main([*flags, '--json']) == 0
     flown = json.loads(capsys.readouterr().out)
     assert flight['landing_position_m'] == flown['landing_position_m']
     assert flight['flight_time_s'] == flown['flight_time_s']
     assert flight['starts_late_s'] <= 1 / 200
     assert flight['messages']['missing'] == 0
-    assert {e['name'] for e in told['discs'][0]['events']} == {'thrown', 'landed'}
+    assert {e['name'] for e in document['discs'][0]['events']} == {'thrown', 'landed'}
     topics = {info.topic.name: info.message_count for info in open_bag(bag).topics}
     for name in ('/odom', '/pose', '/transform', '/joint_states', '/imu', '/release', '/markers'):
         assert topics[name], name
@@ -108,7 +108,7 @@ def test_it_throws_records_verifies_and_tells(tmp_path, capsys):
 @pytest.mark.parametrize(
     ('number', 'when'), [(signal.SIGINT, 'starting'), (signal.SIGTERM, 'throwing')]
 )
-def test_a_signal_ends_all_of_it(tmp_path, number, when):
+def test_a_signal_ends_all_processes(tmp_path, number, when):
     process = start(tmp_path, '--height', '20', '--bag', 'mine')
     children = []
     try:
@@ -152,7 +152,7 @@ def test_bad_input_is_refused_before_anything_is_started(capsys, tmp_path, monke
     assert [path.name for path in tmp_path.iterdir()] == ['bag']
 
 
-def test_without_ros_it_says_so_in_one_line():
+def test_without_ros_it_is_refused_in_one_line():
     code = "import sys; sys.modules['rclpy'] = None; from disc_sim_ros.cli.demo import main; "
     for arguments, returned, text in (
         ([], 1, 'ROS 2'),

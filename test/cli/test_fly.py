@@ -1,4 +1,4 @@
-"""`fly` as its users meet it: the document and the summary that it prints."""
+"""`fly`: the document and the summary that it prints."""
 
 import math
 import re
@@ -29,18 +29,18 @@ LAUNCHES = {
 
 @pytest.mark.parametrize('arguments', LAUNCHES.values(), ids=LAUNCHES)
 def test_the_document_is_complete_and_typed(document, arguments):
-    found = document('--samples', 20, *arguments)
-    assert isinstance(found['launch'], dict)
-    assert found['landed'] is True
+    flown = document('--samples', 20, *arguments)
+    assert isinstance(flown['launch'], dict)
+    assert flown['landed'] is True
     for key in ('flight_time_s', 'range_m', 'drift_m', 'apex_m'):
-        assert isinstance(found[key], float), key
-    assert np.shape(found['landing_position_m']) == (3,)
-    assert found['landing_position_m'][2] == 0.0
-    n = len(found['t_s'])
-    assert n == math.floor(found['flight_time_s'] * 20) + 1
+        assert isinstance(flown[key], float), key
+    assert np.shape(flown['landing_position_m']) == (3,)
+    assert flown['landing_position_m'][2] == 0.0
+    n = len(flown['t_s'])
+    assert n == math.floor(flown['flight_time_s'] * 20) + 1
     for key, shape in ARRAYS.items():
-        assert np.shape(found[key]) == (n, *shape), key
-        assert np.isfinite(found[key]).all(), key
+        assert np.shape(flown[key]) == (n, *shape), key
+        assert np.isfinite(flown[key]).all(), key
 
 
 def test_without_samples_the_document_holds_no_arrays(document):
@@ -87,9 +87,9 @@ def test_the_defaults_are_the_throw_of_fig_5(document):
 
 @pytest.mark.parametrize('arguments', LAUNCHES.values(), ids=LAUNCHES)
 def test_the_first_sample_is_the_launch(document, arguments):
-    found = document('--samples', 20, *arguments)
-    launch = found['launch']
-    first = {key: np.array(found[key][0]) for key in ARRAYS}
+    flown = document('--samples', 20, *arguments)
+    launch = flown['launch']
+    first = {key: np.array(flown[key][0]) for key in ARRAYS}
     velocity = paper_velocity(launch) * (1, -1, -1)  # to map: y left, z up
     through_air = velocity - launch['wind_m_s']
     assert_array_equal(first['position_m'], [0.0, 0.0, launch['height_m']])
@@ -107,9 +107,9 @@ def test_the_first_sample_is_the_launch(document, arguments):
 @pytest.mark.parametrize('arguments', LAUNCHES.values(), ids=LAUNCHES)
 def test_the_arrays_agree_with_each_other(document, arguments):
     rate = 500
-    found = document('--samples', rate, *arguments)
-    arrays = {key: np.array(found[key]) for key in ARRAYS}
-    through_air = arrays['velocity_m_s'] - found['launch']['wind_m_s']
+    flown = document('--samples', rate, *arguments)
+    arrays = {key: np.array(flown[key]) for key in ARRAYS}
+    through_air = arrays['velocity_m_s'] - flown['launch']['wind_m_s']
     airspeed = np.linalg.norm(through_air, axis=1)
     assert_allclose(arrays['airspeed_m_s'], airspeed, rtol=0.0, atol=ROUNDING)
     # eqn 50; the arc cosine near 1 makes 1e-16 to 1e-8 rad.
@@ -126,8 +126,8 @@ def test_the_arrays_agree_with_each_other(document, arguments):
 @pytest.mark.parametrize('arguments', LAUNCHES.values(), ids=LAUNCHES)
 def test_the_angle_of_attack_is_that_of_the_attitude(document, arguments):
     """The paper's eqn 17 through scipy's rotations; the yaw comes from the flight itself."""
-    found = document('--samples', 50, *arguments)
-    launch = found['launch']
+    printed = document('--samples', 50, *arguments)
+    launch = printed['launch']
     names = ('speed', 'pitch', 'roll', 'yaw', 'angle_of_attack', 'sideslip', 'spin', 'height')
     units = ('m_s', 'deg', 'deg', 'deg', 'deg', 'deg', 'rad_s', 'm')
     given = {name: launch[f'{name}_{unit}'] for name, unit in zip(names, units, strict=True)}
@@ -136,27 +136,27 @@ def test_the_angle_of_attack_is_that_of_the_attitude(document, arguments):
     setup = flight.Setup(disc=disc_file.load_disc('frisbee'), wind=flight.Wind(mean=wind))
     flown = flight.fly(Launch(**given, **rates), setup, sample_rate=50.0)
     attitude = Rotation.from_quat(np.roll(flown.trajectory.attitude, -1, axis=1))
-    through_air = (np.array(found['velocity_m_s']) - launch['wind_m_s']) * (1, -1, -1)
+    through_air = (np.array(printed['velocity_m_s']) - launch['wind_m_s']) * (1, -1, -1)
     u, v, w = attitude.inv().apply(through_air).T
     alpha = np.degrees(np.arctan2(w, np.hypot(u, v)))
-    assert_allclose(found['alpha_deg'], alpha, rtol=0.0, atol=1e-7)  # scipy normalises again
+    assert_allclose(printed['alpha_deg'], alpha, rtol=0.0, atol=1e-7)  # scipy normalises again
 
 
 @pytest.mark.parametrize('rate', [1, 7, 30, 333.3, 1000, 0.001, 3000])
 def test_samples_are_timed_exactly(document, rate):
-    found = document('--samples', rate)
-    t = found['t_s']
+    flown = document('--samples', rate)
+    t = flown['t_s']
     assert t == [k / rate for k in range(len(t))]
     # The landing is known to 1e-12 s, and a sample may fall on it.
-    assert t[-1] <= found['flight_time_s'] + 1e-12
-    assert len(t) / rate > found['flight_time_s'] - 1e-12
+    assert t[-1] <= flown['flight_time_s'] + 1e-12
+    assert len(t) / rate > flown['flight_time_s'] - 1e-12
 
 
 @pytest.mark.parametrize('rate', [0.001, 7, 100, 333.3, 3000])
 @pytest.mark.parametrize('more', [(), ('--turbulence', 10)], ids=['still air', 'gusts'])
 def test_samples_do_not_change_the_flight_by_a_bit(document, rate, more):
-    found = document('--samples', rate, *more)
-    assert {key: value for key, value in found.items() if key not in ARRAYS} == document(*more)
+    flown = document('--samples', rate, *more)
+    assert {key: value for key, value in flown.items() if key not in ARRAYS} == document(*more)
 
 
 def test_samples_of_two_rates_agree_where_they_meet(document):
@@ -166,61 +166,61 @@ def test_samples_of_two_rates_agree_where_they_meet(document):
         assert_allclose(slow[key], fast[key][::7], rtol=0.0, atol=ROUNDING, err_msg=key)
 
 
-def test_a_flight_without_ground_goes_on_for_its_duration(document):
-    found = document('--no-ground', '--duration', 5, '--samples', 10)
-    assert (found['landed'], found['landing_position_m']) == (False, None)
-    assert found['flight_time_s'] == 5.0
-    assert found['t_s'][-1] == 5.0
-    assert found['end_position_m'] == found['position_m'][-1]
-    assert found['end_position_m'][2] < 0.0
+def test_a_flight_without_ground_lasts_for_its_duration(document):
+    flown = document('--no-ground', '--duration', 5, '--samples', 10)
+    assert (flown['landed'], flown['landing_position_m']) == (False, None)
+    assert flown['flight_time_s'] == 5.0
+    assert flown['t_s'][-1] == 5.0
+    assert flown['end_position_m'] == flown['position_m'][-1]
+    assert flown['end_position_m'][2] < 0.0
 
 
-def test_a_flight_that_is_cut_short_has_not_landed(document):
-    found = document('--duration', 1)
-    assert (found['landed'], found['landing_position_m']) == (False, None)
-    assert found['flight_time_s'] == 1.0
-    assert found['end_position_m'][2] > 0.0
+def test_a_flight_shorter_than_its_landing_has_not_landed(document):
+    flown = document('--duration', 1)
+    assert (flown['landed'], flown['landing_position_m']) == (False, None)
+    assert flown['flight_time_s'] == 1.0
+    assert flown['end_position_m'][2] > 0.0
 
 
 def test_range_and_drift_are_those_of_the_landing(document):
-    found = document('--yaw', 40)
-    x, y, _ = found['landing_position_m']
-    assert found['range_m'] == pytest.approx(math.hypot(x, y), abs=ROUNDING)
+    flown = document('--yaw', 40)
+    x, y, _ = flown['landing_position_m']
+    assert flown['range_m'] == pytest.approx(math.hypot(x, y), abs=ROUNDING)
     yaw = math.radians(40)  # to the right, so towards -y
     left = x * math.sin(yaw) + y * math.cos(yaw)
-    assert found['drift_m'] == pytest.approx(left, abs=ROUNDING)
+    assert flown['drift_m'] == pytest.approx(left, abs=ROUNDING)
 
 
 def test_the_apex_is_not_below_any_sample(document):
-    found = document('--samples', 2000)
-    heights = np.array(found['position_m'])[:, 2]
+    flown = document('--samples', 2000)
+    heights = np.array(flown['position_m'])[:, 2]
     # Between two samples 0.5 ms apart the top rises by g t^2 / 2 at most.
-    assert 0.0 <= found['apex_m'] - heights.max() < 9.81 * 0.0005**2 / 2
+    assert 0.0 <= flown['apex_m'] - heights.max() < 9.81 * 0.0005**2 / 2
 
 
 def test_without_airspeed_there_is_no_advance_ratio(document):
-    found = document('--speed', 0, '--height', 5, '--samples', 10)
-    assert found['advance_ratio'][0] is None
-    assert found['advance_ratio'][1] > 0.0
+    flown = document('--speed', 0, '--height', 5, '--samples', 10)
+    assert flown['advance_ratio'][0] is None
+    assert flown['advance_ratio'][1] > 0.0
 
 
-def test_the_summary_tells_the_flight(fly, document):
-    result, found = fly(), document()
+def test_the_summary_describes_the_flight(fly, document):
+    result, flown = fly(), document()
     assert (result.code, result.err) == (0, '')
     lines = result.out.splitlines()
     assert 5 <= len(lines) <= 20
     assert max(map(len, lines)) < 100
-    x, y, _ = found['landing_position_m']
+    x, y, _ = flown['landing_position_m']
     assert lines[0].startswith('frisbee: ')
     for part in (
         'exact',
         'table',
         '15 m/s',
         '31.416 rad/s, clockwise',
-        f'landed  after {found["flight_time_s"]:.3f} s at x {x:.2f} m, y {y:.2f} m',
-        f'range   {found["range_m"]:.2f} m, drift {-found["drift_m"]:.2f} m to the right',
-        f'apex {found["apex_m"]:.2f} m',
-        f'{found["end_spin_rad_s"] / 31.416:.1%} of the spin left',
+        f'landed  after {flown["flight_time_s"]:.3f} s at x {x:.2f} m, y {y:.2f} m',
+        f'range   {flown["range_m"]:.2f} m, drift {-flown["drift_m"]:.2f} m to the right',
+        f'apex {flown["apex_m"]:.2f} m',
+        f'{flown["end_spin_rad_s"] / 31.416:.1%} of the spin left',
     ):
         assert part in result.out
 
@@ -240,21 +240,21 @@ def test_the_summary_tells_the_flight(fly, document):
         (('--disc', 'wraith'), 'wraith: Innova Wraith'),
     ],
 )
-def test_the_summary_tells_what_is_special(fly, arguments, part):
+def test_the_summary_names_each_special_condition(fly, arguments, part):
     assert part in fly(*arguments).out
 
 
 def test_the_summary_holds_a_table_of_samples(fly, document):
     rows = fly('--samples', 2).out.splitlines()[-8:]
-    found = document('--samples', 2)
-    assert len(found['t_s']) == 8
-    for row, t, (x, y, z) in zip(rows, found['t_s'], found['position_m'], strict=True):
+    flown = document('--samples', 2)
+    assert len(flown['t_s']) == 8
+    for row, t, (x, y, z) in zip(rows, flown['t_s'], flown['position_m'], strict=True):
         assert [float(cell) for cell in row.split()[:4]] == [
             pytest.approx(value, abs=0.6e-3) for value in (t, x, y, z)
         ]
 
 
-def test_help_names_every_flag_its_unit_and_its_range(fly):
+def test_help_states_the_unit_and_the_range_of_every_flag(fly):
     result = fly('--help')
     text = ' '.join(result.out.split())
     assert (result.code, result.err) == (0, '')

@@ -1,4 +1,4 @@
-"""`fly --bag` as its users meet it."""
+"""`fly --bag` as a command."""
 
 import os
 from pathlib import Path
@@ -36,7 +36,7 @@ def refused(result, *fragments):
         assert fragment in err
 
 
-def test_it_writes_a_bag_and_says_so(run, tmp_path):
+def test_it_writes_a_bag_and_reports_it(run, tmp_path):
     pytest.importorskip('rclpy')
     code, out, err = run(*SHORT, '--bag', tmp_path / 'a b' / 'bag')
     assert (code, err) == (0, '')
@@ -54,7 +54,7 @@ def test_it_writes_a_bag_and_says_so(run, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ['a b', 'half', 'slow']
 
 
-def test_what_it_cannot_write_is_refused_before_the_flight(run, tmp_path):
+def test_a_bag_that_cannot_be_written_is_refused_before_the_flight(run, tmp_path):
     pytest.importorskip('rclpy')
     (tmp_path / 'bag').mkdir()
     refused(run('--bag', tmp_path / 'bag'), '--bag', 'exists already')
@@ -71,7 +71,7 @@ def test_what_it_cannot_write_is_refused_before_the_flight(run, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ['bag', 'file']
 
 
-def test_without_ros_it_says_what_it_needs_in_one_line(tmp_path):
+def test_without_ros_it_names_the_missing_packages_in_one_line(tmp_path):
     code = (
         "import sys; sys.modules['rclpy'] = None; from disc_sim_ros.cli.fly import main; "
         f'sys.exit(main(["--bag", {str(tmp_path / "bag")!r}]))'
@@ -82,8 +82,8 @@ def test_without_ros_it_says_what_it_needs_in_one_line(tmp_path):
     refused((result.returncode, result.stdout, result.stderr), '--bag', 'ROS 2', 'rclpy')
 
 
-def test_make_fly_throws_also_where_there_is_no_ros(tmp_path):
-    """The target itself, with programs in the place of .venv that say how they were called."""
+def test_make_fly_also_works_without_ros(tmp_path):
+    """The target itself, with programs in place of those of .venv that print their arguments."""
     root = Path(__file__).parents[2]
     (tmp_path / 'Makefile').write_text((root / 'Makefile').read_text())
 

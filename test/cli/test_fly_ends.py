@@ -1,4 +1,4 @@
-"""`fly`: how it ends: interrupted, without a reader, in a poor environment."""
+"""`fly`: interrupted, with a closed or full stdout, and in a minimal environment."""
 
 import json
 import os
@@ -19,22 +19,22 @@ pytestmark = pytest.mark.usefixtures('compiled')
 
 
 def test_ctrl_c_ends_a_flight_at_once(fly, monkeypatch):
-    """Compiled code looks for no signals, so that the system must end the program."""
-    seen = []
+    """Compiled code checks no signals: the system must end the process."""
+    handlers = []
     real = flight.fly
 
     def watched(*arguments: object, **options: object) -> flight.Flight:
-        seen.append(signal.getsignal(signal.SIGINT))
+        handlers.append(signal.getsignal(signal.SIGINT))
         return real(*arguments, **options)
 
     before = signal.getsignal(signal.SIGINT)
     monkeypatch.setattr(flight, 'fly', watched)
     assert fly().code == 0
-    assert seen == [signal.SIG_DFL]
+    assert handlers == [signal.SIG_DFL]
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_ctrl_c_elsewhere_leaves_no_traceback(fly, monkeypatch):
+def test_ctrl_c_before_the_flight_prints_no_traceback(fly, monkeypatch):
     def interrupted(_: str) -> None:
         raise KeyboardInterrupt
 
@@ -50,7 +50,7 @@ def test_it_runs_in_any_thread(fly):
     assert codes == [0]
 
 
-def test_a_reader_who_has_enough_is_no_error():
+def test_a_reader_that_stops_reading_is_no_error():
     with subprocess.Popen(
         [EXECUTABLE, '--json', '--samples', '2000'],
         stdout=subprocess.PIPE,
@@ -64,14 +64,14 @@ def test_a_reader_who_has_enough_is_no_error():
     assert running.returncode == 141  # as a shell says of SIGPIPE
 
 
-def test_a_full_stdout_is_an_error_of_one_line():
+def test_a_full_stdout_is_reported_in_one_line():
     with Path('/dev/full').open('w', encoding='utf-8') as full:
         ended = start('--json', stdout=full, env=environment(NUMBA_DISABLE_JIT='1'))
     assert ended.returncode == 1
     assert re.fullmatch(r'fly: error: [^\n]*stdout[^\n]*No space left[^\n]*\n', ended.stderr)
 
 
-def test_it_runs_with_nothing_open_and_a_poor_environment(tmp_path):
+def test_it_runs_without_streams_and_with_a_minimal_environment(tmp_path):
     """No stdin, stdout or stderr; no HOME, ASCII only; spaces and umlauts in every name."""
     folder = tmp_path / 'a folder'
     folder.mkdir()
@@ -92,13 +92,13 @@ def test_it_runs_with_nothing_open_and_a_poor_environment(tmp_path):
     head, rows = table_of(folder / 'wür fe.csv')
     assert head[0] == 't_s'
     assert len(rows) > 300
-    # And with stdout open, what it cannot print in ASCII it escapes.
+    # With stdout open, characters outside ASCII are escaped.
     shown = start(*arguments, cwd=folder, env=bare, stdin=subprocess.DEVNULL)
     assert (shown.returncode, shown.stderr) == (0, '')
     assert 'Sch\\xfcssel 1: Sch\\xfcssel' in shown.stdout
 
 
-def test_plain_python_flies_the_compiled_flight(document):
+def test_plain_python_gives_the_compiled_flight(document):
     arguments = ('--step', '0.01', '--turbulence', '5', '--disc', 'frisbee_roll_moment')
     ended = start('--json', *arguments, env=environment(NUMBA_DISABLE_JIT='1'))
     assert (ended.returncode, ended.stderr) == (0, '')

@@ -1,4 +1,4 @@
-"""`fly`: the files that it writes, whole or not at all."""
+"""`fly`: the files that it writes, completely or not at all."""
 
 from collections.abc import Callable, Iterator
 import errno
@@ -45,7 +45,7 @@ def test_the_csv_holds_the_numbers_of_the_document(fly, document, tmp_path, argu
     assert f'{path}, {len(rows)} rows' in result.out
 
 
-def test_files_are_sampled_without_being_asked(fly, tmp_path):
+def test_files_are_sampled_by_default(fly, tmp_path):
     fly('--csv', tmp_path / 'x.csv')
     _, rows = table_of(tmp_path / 'x.csv')
     assert [row[0] for row in rows] == [k / 100 for k in range(len(rows))]
@@ -85,15 +85,15 @@ def test_a_pdf_is_one(fly, tmp_path):
     ],
     ids=['lands at once', 'stays where it is', 'one sample', 'underground', 'straight up'],
 )
-def test_odd_flights_can_be_drawn(fly, tmp_path, arguments):
+def test_unusual_flights_can_be_drawn(fly, tmp_path, arguments):
     result = fly('--plot', tmp_path / 'x.png', *arguments)
     assert (result.code, result.err) == (0, '')
     assert (tmp_path / 'x.png').stat().st_size > 10_000
 
 
 @pytest.mark.parametrize('name', ['$\\frac$', '飛盤', os.fsdecode(b'x\xff'), '100 % & <b>_^{'])
-def test_discs_of_odd_names_can_be_drawn(fly, tmp_path, name):
-    """A dollar is mathematics for matplotlib, and not every script is in its font."""
+def test_discs_with_unusual_names_can_be_drawn(fly, tmp_path, name):
+    """A dollar starts mathematics in matplotlib, and its font lacks some scripts."""
     path = tmp_path / f'{name}.yaml'
     path.write_text('based_on: frisbee\n', encoding='utf-8')
     assert fly('--disc', path, '--plot', tmp_path / 'x.png').code == 0
@@ -102,19 +102,19 @@ def test_discs_of_odd_names_can_be_drawn(fly, tmp_path, name):
 
 @pytest.fixture(params=['--csv', '--plot'])
 def write(request) -> Callable[..., tuple[object, ...]]:
-    """The arguments that write a file, in both ways."""
+    """Return the arguments that write a file, as CSV or as a plot."""
     return lambda path, *more: (request.param, path, '--samples', 10, *more)
 
 
 @pytest.fixture
 def old(tmp_path) -> Path:
-    """A file that is there already; .png, so that both ways may write it."""
+    """Return an existing file; it ends in .png, so that --csv and --plot may write it."""
     path = tmp_path / 'flight.png'
     path.write_bytes(b'precious')
     return path
 
 
-def test_an_older_file_is_replaced_and_keeps_its_permissions(fly, write, old):
+def test_an_existing_file_is_replaced_and_keeps_its_permissions(fly, write, old):
     old.chmod(0o640)
     assert fly(*write(old)).code == 0
     assert old.read_bytes() != b'precious'
@@ -138,7 +138,7 @@ def test_a_linked_file_is_replaced_and_the_link_stays(fly, write, old, tmp_path)
     assert len(list(folder.iterdir())) == 1
 
 
-def test_a_link_to_a_file_to_come_makes_the_file(fly, write, tmp_path):
+def test_a_link_to_a_missing_file_creates_the_file(fly, write, tmp_path):
     (tmp_path / 'link.png').symlink_to('real.png')
     assert fly(*write(tmp_path / 'link.png')).code == 0
     assert (tmp_path / 'link.png').is_symlink()
@@ -153,7 +153,9 @@ def test_a_relative_name_in_a_folder_with_spaces(fly, write, tmp_path, monkeypat
     assert [path.name for path in folder.iterdir()] == ['a flight.png']
 
 
-def test_what_cannot_be_written_is_refused_before_the_flight(fly, write, tmp_path, monkeypatch):
+def test_a_file_that_cannot_be_written_is_refused_before_the_flight(
+    fly, write, tmp_path, monkeypatch
+):
     monkeypatch.setattr(flight, 'fly', lambda *_, **__: pytest.fail('it flew'))
     (tmp_path / 'file').touch()
     (tmp_path / 'folder.png').mkdir()
@@ -171,7 +173,7 @@ def test_what_cannot_be_written_is_refused_before_the_flight(fly, write, tmp_pat
     assert names == {'file', 'folder.png', 'circle.png'}
 
 
-def test_a_closed_folder_and_a_closed_file_are_refused(fly, write, old, tmp_path):
+def test_a_read_only_folder_and_a_read_only_file_are_refused(fly, write, old, tmp_path):
     closed = tmp_path / 'closed'
     closed.mkdir()
     closed.chmod(0o555)
@@ -189,7 +191,7 @@ def test_a_full_device_is_refused(fly):
 
 @pytest.fixture
 def full_disk(tmp_path) -> Iterator[Path]:
-    """A folder on a file system that takes 16 kB."""
+    """Mount a file system of 16 kB."""
     folder = tmp_path / 'disk'
     folder.mkdir()
     command = ['mount', '-t', 'tmpfs', '-o', 'size=16k', 'none', str(folder)]
@@ -199,7 +201,7 @@ def full_disk(tmp_path) -> Iterator[Path]:
     subprocess.run(['umount', str(folder)], check=True)
 
 
-def test_a_full_disk_leaves_the_older_file_and_nothing_else(fly, write, full_disk):
+def test_a_full_disk_leaves_only_the_existing_file(fly, write, full_disk):
     old = full_disk / 'flight.png'
     old.write_bytes(b'precious')
     refused(fly(*write(old), '--samples', 500), 'No space left', 'flight.png')
@@ -210,7 +212,7 @@ def test_a_full_disk_leaves_the_older_file_and_nothing_else(fly, write, full_dis
 @pytest.mark.parametrize(
     'failure', [OSError(errno.ENOSPC, 'No space left on device'), KeyboardInterrupt()]
 )
-def test_a_write_that_fails_half_way_leaves_the_older_file(fly, write, old, monkeypatch, failure):
+def test_a_write_that_fails_leaves_the_existing_file(fly, write, old, monkeypatch, failure):
     def fail(_: int) -> None:
         assert len(list(old.parent.iterdir())) == 2  # the older and the half-written new one
         raise failure
@@ -225,7 +227,7 @@ def test_a_write_that_fails_half_way_leaves_the_older_file(fly, write, old, monk
     assert list(old.parent.iterdir()) == [old]
 
 
-def test_a_killed_program_leaves_the_older_file(old):
+def test_a_killed_program_leaves_the_existing_file(old):
     script = (
         'import os, sys\n'
         'from disc_sim_ros.cli import output\n'
@@ -237,8 +239,8 @@ def test_a_killed_program_leaves_the_older_file(old):
     assert old.read_bytes() == b'precious'
 
 
-def test_what_a_killed_program_left_is_in_nobodys_way(old, monkeypatch):
-    """In a container every run may have the same process id."""
+def test_leftovers_of_a_killed_program_do_not_disturb_the_next_run(old, monkeypatch):
+    """In a container each run may have the same process id."""
     monkeypatch.setattr(os, 'fsync', lambda _: (_ for _ in ()).throw(OSError(5, 'broken')))
     monkeypatch.setattr(Path, 'unlink', lambda *_, **__: None)
     for _ in range(2):
@@ -250,13 +252,13 @@ def test_what_a_killed_program_left_is_in_nobodys_way(old, monkeypatch):
     assert old.read_bytes() == b'new'
 
 
-def test_the_longest_name_that_a_file_may_have_can_be_written(tmp_path):
+def test_a_file_name_of_the_greatest_length_can_be_written(tmp_path):
     path = tmp_path / ('x' * 251 + '.csv')
     output.write_whole('--csv', str(path), b'new')
     assert path.read_bytes() == b'new'
 
 
-@pytest.mark.timeout(60)  # a pipe that is opened in the wrong order waits for ever
+@pytest.mark.timeout(60)  # a pipe opened in the wrong order blocks forever
 def test_a_named_pipe_takes_a_csv(fly, tmp_path):
     os.mkfifo(tmp_path / 'pipe')
     received = []

@@ -160,7 +160,7 @@ def test_a_longer_step_moves_the_landing_slightly(document):
     assert 0.0 < np.linalg.norm(moved) < 1e-3
 
 
-def test_gusts_depend_on_their_seed_alone(document):
+def test_gusts_depend_only_on_their_seed(document):
     gusty = document('--turbulence', 10, '--seed', 1)
     assert gusty == document('--turbulence', 10, '--seed', 1)
     assert gusty['range_m'] != document('--turbulence', 10, '--seed', 2)['range_m']
@@ -180,7 +180,7 @@ def test_the_advance_ratio_gives_the_spin(document, ratio):
     assert found == same
 
 
-def test_the_advance_ratio_takes_the_diameter_of_the_disc(document):
+def test_the_advance_ratio_uses_the_diameter_of_the_disc(document):
     found = document('--advance-ratio', 0.5, '--disc', 'wraith')
     assert found['launch']['spin_rad_s'] == pytest.approx(2 * 15 * 0.5 / 0.211, rel=1e-15)
 
@@ -189,7 +189,7 @@ def test_at_speed_0_only_the_advance_ratio_0_is_accepted(document):
     assert document('--speed', 0, '--advance-ratio', 0)['launch']['spin_rad_s'] == 0.0
 
 
-def test_a_users_disc_flies(document, tmp_path):
+def test_a_disc_file_of_the_user_flies(document, tmp_path):
     path = tmp_path / 'my disc.yaml'
     path.write_text('based_on: frisbee\nmass_kg: 1.75e-1\n', encoding='utf-8')
     found = document('--disc', path)

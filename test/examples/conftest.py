@@ -1,4 +1,4 @@
-"""The examples talk to real simulators, as the tests of the nodes do."""
+"""The examples connect to real simulators, as the tests of the nodes do."""
 
 from ros.conftest import ros, ros_context, ros_environment
 

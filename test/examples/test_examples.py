@@ -45,7 +45,7 @@ def start(name: str, *arguments: str) -> subprocess.Popen:
 
 
 def run(name: str, *arguments: str, code: int = 0) -> str:
-    """Run an example to its end and return what it printed."""
+    """Run an example to its end and return its stdout."""
     process = start(name, *arguments)
     try:
         output, errors = process.communicate(timeout=DEADLINE)
@@ -59,9 +59,9 @@ def run(name: str, *arguments: str, code: int = 0) -> str:
 
 @pytest.fixture
 def load(ros_environment, monkeypatch):
-    """A function that loads an example, to call its `main` in the test's process."""
+    """Return a function that loads an example, to call its `main` in this process."""
 
-    monkeypatch.syspath_prepend(str(EXAMPLES))  # as for a script that is started there
+    monkeypatch.syspath_prepend(str(EXAMPLES))  # as for a script in that folder
 
     def loaded(name: str):
         spec = importlib.util.spec_from_file_location(Path(name).stem, EXAMPLES / name)
@@ -81,7 +81,7 @@ def test_throw_flies_as_the_physics_computes(ros, namespace):
     ros.start(WAITING, namespace=namespace)
     events = ros.subscribe(DiagnosticStatus, f'{namespace}/{topics.FLIGHT_EVENTS}')
     odometry = ros.subscribe(Odometry, f'{namespace}/{topics.ODOM}')
-    ros.spin_until(lambda: odometry, 'odometry')  # then it knows of both subscriptions
+    ros.spin_until(lambda: odometry, 'odometry')  # then both subscriptions are matched
     launch = {'speed': 18.0, 'pitch': 12.0, 'roll': 7.0, 'yaw': 25.0, 'spin': 40.0, 'height': 1.2}
     options = itertools.chain(*((f'--{name}', str(value)) for name, value in launch.items()))
     remap = ('--ros-args', '-r', f'__ns:={namespace}') if namespace else ()
@@ -146,7 +146,7 @@ def test_steer_turns_the_flight_as_the_physics_computes(ros):
     ]
     for end, control in zip(ends, (None, Control(0.001, 0.005, 0.002)), strict=True):
         flight = fly(Launch(), FRISBEE, control=control) if control else fly(Launch(), FRISBEE)
-        # The first command comes a step or so before or after the release.
+        # The first command arrives about one step before or after the release.
         assert end == pytest.approx(flight.position[:2], abs=0.02)
     assert abs(ends[1][1] - ends[0][1]) > 1.0
 
@@ -184,7 +184,7 @@ def test_the_pilot_lands_a_disc_at_a_target_in_unknown_wind(load, launch, target
     np.testing.assert_allclose(pilot.wind, (0.0, -wind_y), atol=0.2)
 
 
-def test_steer_to_target_ends_with_a_bag_and_a_plot_within_a_metre(tmp_path):
+def test_steer_to_target_lands_within_a_metre_and_writes_bag_and_plot(tmp_path):
     options = ('--target', '26', '0', '--roll', '10', '--wind', '0', '3', '0', '--pace', '0.25')
     output = run('steer_to_target.py', *options, '--folder', str(tmp_path / 'x'))
     assert 'identical to the last bit' in output
@@ -196,7 +196,7 @@ def test_steer_to_target_ends_with_a_bag_and_a_plot_within_a_metre(tmp_path):
     assert float(steered[1]) < 1.0
 
 
-def test_spiral_flies_the_manoeuvre_of_the_paper(tmp_path, load):
+def test_spiral_flies_the_spiral_turn_of_the_paper(tmp_path, load):
     output = run('spiral.py', 'turn', '--folder', str(tmp_path / 'x'), '--pace', '2')
     assert 'identical to the last bit' in output
     module = load('spiral.py')
@@ -204,7 +204,7 @@ def test_spiral_flies_the_manoeuvre_of_the_paper(tmp_path, load):
     spin = module.parameters(turn)['launch.spin']
     expected = fly(Launch(**turn.launch, spin=spin), FRISBEE, control=Control(*turn.command))
     line = output.splitlines()[-1]
-    match = re.search(r'x (-?[\d.]+) m, y (-?[\d.]+) m, .* after ([\d.]+) s', line)
-    x, y, time = map(float, match.groups())
+    numbers = re.search(r'x (-?[\d.]+) m, y (-?[\d.]+) m, .* after ([\d.]+) s', line)
+    x, y, time = map(float, numbers.groups())
     assert (x, y) == pytest.approx(expected.position[:2], abs=0.006)  # two digits
     assert time == pytest.approx(expected.time, abs=0.006)
