@@ -93,8 +93,8 @@ AIR = _table(
 
 # A disc; the fields of physics.disc.Disc and LinearAero, with the unit the keys of disc files.
 DISC = _table(
-    Quantity('mass', 'kg', 0.0, inf, None, 'Mass', open=True),
-    Quantity('diameter', 'm', 0.0, inf, None, "Diameter, the paper's c", open=True),
+    Quantity('mass', 'kg', 1e-3, 100.0, None, 'Mass'),
+    Quantity('diameter', 'm', 0.01, 5.0, None, "Diameter, the paper's c"),
     Quantity('area', 'm^2', 0.0, inf, None, "Planform area, the paper's S", open=True),
     Quantity(
         'inertia_axial', 'kg m^2', 0.0, inf, None,
@@ -175,7 +175,7 @@ VARIED = (
     | MEAN_WIND
     | CONTROL
     | _table(
-        DISC['mass'].within(1e-3, 100.0),
+        DISC['mass'],
         DISC['inertia_axial'].within(1e-7, 100.0),
         DISC['inertia_diametral'].within(1e-7, 100.0),
         DAMPING['C_Lp'].within(-100.0),

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics.disc_checks import check_body, check_number
 from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
 
 AERODYNAMICS = ('table', 'linear')
@@ -139,8 +140,8 @@ class Disc:
     """One disc. SI units; z is the spin axis; coefficients are for area `area`, length `diameter`.
 
     Raises:
-        ConfigError: A number is not finite or physically impossible, or the disc has no
-            aerodynamics of the kind that it names as its own.
+        ConfigError: A number is out of range, mass, size and inertia contradict each other, or the
+            disc has no aerodynamics of the kind that it names as its own.
     """
 
     name: str
@@ -160,12 +161,11 @@ class Disc:
     description: str = ''
 
     def __post_init__(self) -> None:
-        for name, quantity in (DISC | DAMPING).items():
+        for name, quantity in DISC.items():
+            check_number(quantity, getattr(self, name))
+        for name, quantity in DAMPING.items():
             quantity.check(getattr(self, name))
-        # No body has I_z > I_x + I_y; a flat one has equality, to rounding.
-        if self.inertia_axial > 2.0 * self.inertia_diametral * (1 + 1e-9):
-            allowed = f'at most twice inertia_diametral, {2 * self.inertia_diametral:g} kg m^2'
-            raise ConfigError('inertia_axial', self.inertia_axial, allowed, 'inertia_axial')
+        check_body(**{name: getattr(self, name) for name in DISC})
         validation.choice('aero', self.aero, AERODYNAMICS)
         if not self.has(self.aero):
             held = [kind for kind in AERODYNAMICS if self.has(kind)]

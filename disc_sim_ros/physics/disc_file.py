@@ -1,8 +1,9 @@
 """Disc files: YAML files, one for each disc, of the catalogue in the package or of a user.
 
 A file may start from a disc of the catalogue with `based_on: NAME` and then holds only the
-differences. Every key carries its unit. An unknown, repeated, missing or impossible key is
-refused with file, key and reason.
+differences; a new mass or diameter without an inertia scales the inertia of that disc. Every key
+carries its unit. An unknown, repeated, missing or impossible key is refused with file, key and
+reason.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -18,6 +19,7 @@ import yaml
 from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError, brief
 from disc_sim_ros.physics.disc import AERODYNAMICS, AeroTable, Disc, LinearAero, SpinTable
+from disc_sim_ros.physics.disc_checks import check_number
 from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
 from disc_sim_ros.validation import Quantity
 
@@ -127,12 +129,38 @@ def _merged(keys: dict[str, Any], source: str) -> dict[str, Any]:
     if base_name is None:
         return keys
     base = _entry(validation.choice(f'{source}: based_on', base_name, disc_names()))
+    _scale_inertia(base, keys, base_name)
     for key, value in keys.items():
         if key in {'damping', 'linear'} and isinstance(value, dict):
             base[key] = {**base.get(key, {}), **value}
         else:
             base[key] = value
     return base
+
+
+def _scale_inertia(base: dict[str, Any], keys: dict[str, Any], base_name: str) -> None:
+    """Scale the inertia of a base to another mass or diameter, and append that to the description.
+
+    The shape is kept: I / (m d^2) stays. Nothing is scaled if the file gives an inertia itself, or
+    a mass or diameter out of range, which is refused later.
+    """
+    given = [DISC[name].key for name in ('mass', 'diameter') if DISC[name].key in keys]
+    inertias = [DISC[name].key for name in ('inertia_axial', 'inertia_diametral')]
+    factor = 1.0
+    for key in given:
+        try:
+            ratio = _PROPERTIES[key].check(keys[key]) / base[key]
+        except ConfigError:
+            return
+        factor *= ratio if key == DISC['mass'].key else ratio * ratio
+    if factor == 1.0 or any(key in keys for key in inertias):
+        return
+    for key in inertias:
+        base[key] *= factor
+    text = keys.get('description', base.get('description', ''))
+    if isinstance(text, str):  # anything else is refused later
+        note = f'inertia of {base_name} scaled by {factor:.4g} to the {" and ".join(given)}'
+        keys['description'] = f'{text.rstrip()} ({note})'.lstrip()
 
 
 def _read(name: str, path: Path) -> dict[str, Any]:
@@ -189,7 +217,7 @@ def _disc(name: str, keys: dict[str, Any], source: str) -> Disc:
         fields['description'] = validation.text('description', keys.get('description', ''))
         for key, quantity in _PROPERTIES.items():
             if key in keys:
-                fields[quantity.name] = quantity.check(keys[key], key)
+                fields[quantity.name] = check_number(quantity, keys[key], key)
         fields.setdefault('area', math.pi * fields['diameter'] * fields['diameter'] / 4)
         for section, names in _SECTIONS.items():
             if section in keys:
