@@ -1,4 +1,4 @@
-// Serves a viewer that has a bag and the layout open, for your browser. Nothing leaves the machine.
+// Serves a viewer with a bag and the layout open, for a browser on this machine.
 
 import { parseArgs } from 'node:util';
 
@@ -6,8 +6,8 @@ import { OPTIONS, UserError, run, serve } from './serve.mjs';
 
 const USAGE = `usage: node open.mjs [options] BAG
 
-Serves a viewer with BAG (a folder or an .mcap file) and the layout open; prints the address to open
-in a browser. Only this machine can reach it. Ctrl-C ends it.
+Serves a viewer with BAG (a folder or an .mcap file) and the layout open, and prints its address for
+a browser. Only this machine can reach it. Ctrl-C ends it.
 
   --port N          (default 8765)
   --layout FILE     (default config/foxglove_layout.json)
@@ -33,7 +33,7 @@ await run(async () => {
     console.log(`open ${address}`);
   } catch (error) {
     if (error.code !== 'EADDRINUSE') throw error;
-    throw new UserError(`--port ${port}: taken by another program; give another one`);
+    throw new UserError(`--port ${port}: in use by another program; give another port`);
   }
   return 0;
 });

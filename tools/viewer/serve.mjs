@@ -25,10 +25,10 @@ export const OPTIONS = {
   help: { type: 'boolean', short: 'h' },
 };
 
-/** Something the user can put right; the message is all that he needs. */
+/** An error that the user can correct, with a complete message. */
 export class UserError extends Error {}
 
-/** Run a command; end with 2 and one line where the user can put something right. */
+/** Run a command; end with 2 and one line if the user can correct the error. */
 export async function run(command) {
   try {
     process.exitCode = await command();
@@ -42,7 +42,7 @@ export async function run(command) {
 /** Serve a bag with a layout; return the server and the address to open in a browser. */
 export async function serve({ bag, layout, colours, modules, port = 0 }) {
   if (!existsSync(path.join(modules, '@foxglove'))) {
-    throw new UserError(`${modules}: the viewer is not there; run npm install in ${HERE}`);
+    throw new UserError(`${modules}: the viewer is not installed; run npm install in ${HERE}`);
   }
   const recording = mcap(path.resolve(bag));
   const shown = file(path.resolve(layout));
