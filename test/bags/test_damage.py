@@ -67,11 +67,11 @@ def test_a_file_cut_anywhere_keeps_every_complete_message(whole, tmp_path, compr
             with pytest.raises(BagError):
                 open_bag(path)
             continue
-        found = open_bag(path)
-        got = everything(found)
-        assert not found.complete
+        bag = open_bag(path)
+        got = everything(bag)
+        assert not bag.complete
         assert got == messages[: len(got)]
-        assert len(got) == found.message_count
+        assert len(got) == bag.message_count
         complete = 20 * sum(end <= size for _, end in places)
         assert complete <= len(got) < complete + 20
         if compression == 'none':  # each message whose last byte is there
@@ -105,12 +105,12 @@ def test_the_beginning_of_a_cut_chunk_is_kept(tmp_path, compression):
     [(begin, end)] = chunk_places(content)
     path = tmp_path / 'cut.mcap'
     path.write_bytes(content[: (begin + 3 * end) // 4])
-    found = open_bag(path)
-    got = everything(found)
+    bag = open_bag(path)
+    got = everything(bag)
     # Blocks are of 128 KiB (zstd) and 64 KiB (lz4) of some 650 KiB: half must come out.
     assert 450 < len(got) < 700
     assert got == messages[: len(got)]
-    [loss] = found.losses
+    [loss] = bag.losses
     assert f'its first {len(got)} messages are kept' in str(loss)
     report = repair(path, tmp_path / 'made')
     assert everything(open_bag(tmp_path / 'made')) == got
@@ -148,9 +148,9 @@ def test_a_damaged_chunk_of_an_indexed_bag_is_named_when_it_is_read(whole, tmp_p
     damaged[(begin + end) // 2] ^= 0x55
     path = tmp_path / 'damaged.mcap'
     path.write_bytes(damaged)
-    found = open_bag(path)
+    bag = open_bag(path)
     with pytest.raises(BagError, match=rf'{path}: damaged at byte {begin} .*`repair_bag`'):
-        everything(found)
+        everything(bag)
     report = repair(path, tmp_path / 'made')
     assert report.message_count == 180
     [loss] = report.losses
@@ -189,6 +189,6 @@ def test_a_damaged_index_costs_nothing(whole, tmp_path):
         damaged = bytearray(content)
         damaged[-back] ^= 0xFF
         path.write_bytes(damaged)
-        found = open_bag(path)
-        assert not found.complete
-        assert everything(found) == messages
+        bag = open_bag(path)
+        assert not bag.complete
+        assert everything(bag) == messages

@@ -60,21 +60,21 @@ def foreign_file(path: Path, *, end: bool, topics=FOREIGN) -> None:
 def definitions(path: Path) -> dict[str, tuple]:
     """Name of the topic: its channel and its schema, by the official reader."""
     schemas_found: dict[int, Schema] = {}
-    found = {}
+    texts = {}
     with path.open('rb') as file, suppress(EndOfFile):
         for record in StreamReader(file).records:
             if isinstance(record, Schema):
                 schemas_found[record.id] = record
             elif isinstance(record, Channel):
                 schema = schemas_found.get(record.schema_id)
-                found[record.topic] = (
+                texts[record.topic] = (
                     record.id,
                     record.schema_id,
                     record.message_encoding,
                     record.metadata,
                     schema and (schema.name, schema.encoding, schema.data),
                 )
-    return found
+    return texts
 
 
 @pytest.mark.parametrize('end', [True, False])
@@ -96,8 +96,8 @@ def test_rosbags_opens_a_repaired_bag_with_a_type_that_is_not_installed(tmp_path
     (tmp_path / 'x.mcap').write_bytes(ros)
     repair(tmp_path / 'x.mcap', tmp_path / 'made')
     with Reader(tmp_path / 'made') as reader:
-        found = {c.topic: (c.msgtype, c.msgcount) for c in reader.connections}
-    assert found == {
+        counts = {c.topic: (c.msgtype, c.msgcount) for c in reader.connections}
+    assert counts == {
         '/odom': (ODOMETRY, 1),
         '/stop': ('my_robot_msgs/msg/Stop', 1),
         '/none': ('my_msgs/msg/Unknown', 1),
@@ -170,17 +170,17 @@ def test_topics_without_messages_of_a_killed_bag_keep_their_types(tmp_path):
 def test_every_definition_is_in_the_data_section_of_every_file(tmp_path):
     bag = write_bag(tmp_path / 'bag', 300, split_at=(100, 200))
     for path in bag.files:
-        found: dict[str, list] = {'data': [], 'summary': []}
+        sections: dict[str, list] = {'data': [], 'summary': []}
         section = 'data'
         with path.open('rb') as file:
             for record in StreamReader(file).records:
                 if type(record).__name__ == 'DataEnd':
                     section = 'summary'
-                if isinstance(record, (Channel, Schema)) and record not in found[section]:
-                    found[section].append(record)
-        for record in found['summary']:
-            assert record in found['data']
-        assert {c.topic for c in found['data'] if isinstance(c, Channel)} == {
+                if isinstance(record, (Channel, Schema)) and record not in sections[section]:
+                    sections[section].append(record)
+        for record in sections['summary']:
+            assert record in sections['data']
+        assert {c.topic for c in sections['data'] if isinstance(c, Channel)} == {
             '/odom',
             '/log',
             '/silent',
@@ -309,8 +309,8 @@ def old_bag(folder: Path) -> None:
 
 def records_of(path: Path) -> list[dict]:
     with path.open('rb') as file:
-        found = make_reader(file).iter_metadata()
-        return [yaml.safe_load(m.metadata['serialized_metadata']) for m in found]
+        entries = make_reader(file).iter_metadata()
+        return [yaml.safe_load(m.metadata['serialized_metadata']) for m in entries]
 
 
 def test_a_bag_of_version_0_1_gets_the_record_that_rosbag2_plays(tmp_path):

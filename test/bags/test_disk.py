@@ -31,15 +31,15 @@ def folder(tmp_path) -> Path:
 
 def check(folder: Path, kept: list[int], *losses: str) -> list[str]:
     """Read and repair a bag; compare the messages of its files, and what is said of the others."""
-    found = open_bag(folder)
-    assert not found.complete or not losses
-    assert [c.message_count for c in found.contents if c.message_count] == kept
-    assert len(everything(found)) == found.message_count == sum(kept)
+    opened = open_bag(folder)
+    assert not opened.complete or not losses
+    assert [c.message_count for c in opened.contents if c.message_count] == kept
+    assert len(everything(opened)) == opened.message_count == sum(kept)
     target = folder.with_name('made')
     report = repair(folder, target)
     made = open_bag(target)
     assert made.complete
-    assert everything(made) == everything(found)
+    assert everything(made) == everything(opened)
     assert report.message_count == sum(kept)
     said = [str(loss) for loss in report.losses]
     for loss in losses:
@@ -203,9 +203,9 @@ def test_a_compressed_file_that_is_cut_off_keeps_its_beginning(folder):
     compress_files(folder, range(4))
     path = folder / 'bag_0.mcap.zstd'
     path.write_bytes(path.read_bytes()[:-2000])
-    found = open_bag(folder)
-    assert not found.complete
-    assert any('the compressed file is damaged' in str(loss) for loss in found.losses)
+    bag = open_bag(folder)
+    assert not bag.complete
+    assert any('the compressed file is damaged' in str(loss) for loss in bag.losses)
     report = repair(folder, folder.with_name('made'))
     assert 330 <= report.message_count < 440
 
@@ -268,15 +268,15 @@ def message_compressed(folder: Path, *, end: bool, labelled: bool) -> None:
 def test_compressed_messages_are_read_and_repaired_with_their_label(tmp_path, end, labelled):
     message_compressed(tmp_path / 'bag', end=end, labelled=labelled)
     for folder in ('bag', 'made'):
-        found = open_bag(tmp_path / folder)
-        assert [m.data for m in found.raw('/odom')] == ODOMETRIES[:50]
-        assert [m.value.data for m in found.messages('/log')] == ['hello']
+        bag = open_bag(tmp_path / folder)
+        assert [m.data for m in bag.raw('/odom')] == ODOMETRIES[:50]
+        assert [m.value.data for m in bag.messages('/log')] == ['hello']
         if folder == 'bag':
             report = repair(tmp_path / 'bag', tmp_path / 'made')
             assert report.message_count == 51
-    assert found.complete
-    assert found.metadata.compression_mode == 'MESSAGE'
-    assert found.metadata.compression_format == 'zstd'
+    assert bag.complete
+    assert bag.metadata.compression_mode == 'MESSAGE'
+    assert bag.metadata.compression_format == 'zstd'
     with Reader(tmp_path / 'made') as reader:
         assert [data for _, _, data in reader.messages()] == [*ODOMETRIES[:50], text('hello')]
 

@@ -154,8 +154,8 @@ def test_a_bag_without_messages_has_the_times_of_rosbag2(tmp_path):
     assert about['duration'] == {'nanoseconds': 0}
     assert about['custom_data'] is None
     assert about['ros_distro'] == ''  # not known
-    found = open_bag(tmp_path / 'bag')
-    assert (found.complete, found.message_count, found.start, found.end) == (True, 0, 0, 0)
+    opened = open_bag(tmp_path / 'bag')
+    assert (opened.complete, opened.message_count, opened.start, opened.end) == (True, 0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -174,8 +174,8 @@ def test_any_text_survives_in_custom_data(tmp_path, value):
 
 
 def test_records_stand_in_the_order_of_rosbag2(folder):
-    found = raw_records(folder / 'throw 1_0.mcap')
-    kinds = [type(r).__name__ for r in found]
+    all_records = raw_records(folder / 'throw 1_0.mcap')
+    kinds = [type(r).__name__ for r in all_records]
     chunks = kinds.count('Chunk')
     assert chunks >= 2
     assert kinds[:2] == ['Header', 'Metadata']
@@ -195,28 +195,28 @@ def test_records_stand_in_the_order_of_rosbag2(folder):
 
 
 def test_header_metadata_channels_and_schemas_say_what_rosbag2_says(folder):
-    found = raw_records(folder / 'throw 1_1.mcap')
-    assert next(r for r in found if isinstance(r, records.Header)).profile == 'ros2'
-    opened, closed = (r for r in found if isinstance(r, records.Metadata))
+    all_records = raw_records(folder / 'throw 1_1.mcap')
+    assert next(r for r in all_records if isinstance(r, records.Header)).profile == 'ros2'
+    opened, closed = (r for r in all_records if isinstance(r, records.Metadata))
     for record in (opened, closed):
         assert record.name == 'rosbag2'
         assert list(record.metadata) == ['serialized_metadata']
         about = yaml.safe_load(record.metadata['serialized_metadata'])
         assert list(about) == FIELDS  # without the root, or rosbag2 plays nothing
-    channel = next(r for r in found if isinstance(r, records.Channel) and r.topic == '/odom')
+    channel = next(r for r in all_records if isinstance(r, records.Channel) and r.topic == '/odom')
     assert channel.message_encoding == 'cdr'
     assert channel.metadata == {
         'offered_qos_profiles': qos_yaml([Qos(depth=1000)]),
         'topic_type_hash': TYPES.hash_rihs01(ODOMETRY),
     }
-    schema = next(r for r in found if isinstance(r, records.Schema) and r.name == ODOMETRY)
+    schema = next(r for r in all_records if isinstance(r, records.Schema) and r.name == ODOMETRY)
     assert schema.encoding == 'ros2msg'
     assert schema.data.decode() == schemas.definition(ODOMETRY)
 
 
 def test_chunks_are_of_768_kib_and_sequences_0(folder):
-    found = raw_records(folder / 'throw 1_0.mcap')
-    chunks = [r for r in found if isinstance(r, records.Chunk)]
+    all_records = raw_records(folder / 'throw 1_0.mcap')
+    chunks = [r for r in all_records if isinstance(r, records.Chunk)]
     assert {c.compression for c in chunks} == {'zstd'}
     full = chunks[0].uncompressed_size
     assert 768 * 1024 <= full < 768 * 1024 + len(ODOMETRIES[0]) + 31
@@ -242,8 +242,8 @@ def test_a_type_that_is_not_installed_has_a_schema_without_text(tmp_path):
         empty = bag.add(topic('/empty', 'std_msgs/msg/Empty'))
         bag.write(odd, b'\0\1\0\0\0', 1, 1)
         bag.write(empty, b'\0\1\0\0\0', 2, 2)
-    found = raw_records(tmp_path / 'bag/bag_0.mcap')
-    about = {r.name: (r.encoding, r.data) for r in found if isinstance(r, records.Schema)}
+    all_records = raw_records(tmp_path / 'bag/bag_0.mcap')
+    about = {r.name: (r.encoding, r.data) for r in all_records if isinstance(r, records.Schema)}
     # No encoding: no definition is there. An empty text defines a message without fields.
     assert about == {'odd_msgs/msg/Odd': ('', b''), 'std_msgs/msg/Empty': ('ros2msg', b'')}
     assert [m.type for m in open_bag(tmp_path / 'bag').messages(['/empty'])] == [

@@ -52,14 +52,14 @@ def test_a_killed_writer_loses_at_most_a_second(tmp_path):
                 child.kill()
         for (folder, max_size), child in zip(pair, children, strict=True):
             flushed = int(child.communicate()[0].split()[-1])
-            found = open_bag(folder)
-            got = everything(found)
+            bag = open_bag(folder)
+            got = everything(bag)
             # Between two files it is, for a moment.
-            assert not found.complete or max_size < 10**9
+            assert not bag.complete or max_size < 10**9
             assert len(got) >= flushed > 0
             assert [m[2] for m in got] == list(range(len(got)))  # none is missing in between
             taken = int.from_bytes(folder.with_name(f'{folder.name}.taken').read_bytes(), 'little')
-            assert taken - found.end < LONGEST_LOSS * 1e9
+            assert taken - bag.end < LONGEST_LOSS * 1e9
             report = repair(folder, folder.with_name(f'{folder.name} made'))
             made = open_bag(report.target)
             assert made.complete
@@ -107,13 +107,13 @@ def test_a_full_disk_leaves_a_whole_bag(small_disk, max_size):
     with pytest.raises(BagError, match='No space left'):
         bag.write(noise, b'', 1, 1)
     bag.close()
-    found = open_bag(small_disk / 'bag')
-    assert found.complete
-    assert [m[2] for m in everything(found)] == list(range(found.message_count))
-    assert found.message_count == bag.message_count
+    opened = open_bag(small_disk / 'bag')
+    assert opened.complete
+    assert [m[2] for m in everything(opened)] == list(range(opened.message_count))
+    assert opened.message_count == bag.message_count
     assert bag.message_count + bag.lost == len(written) + 1
-    assert found.message_count > 2000  # of 3 MB, 725 bytes each, most is used
-    assert counted(small_disk / 'bag') == found.message_count
+    assert opened.message_count > 2000  # of 3 MB, 725 bytes each, most is used
+    assert counted(small_disk / 'bag') == opened.message_count
 
 
 def test_the_disk_is_full_from_the_start(small_disk):
@@ -152,9 +152,9 @@ print(bag.message_count)
     )
     *errors, count = done.stdout.splitlines()
     assert 'File too large' in errors[0]
-    found = open_bag(tmp_path / 'bag')
-    assert found.message_count == int(count) > 0  # all but the chunk that found no room
-    assert [m[2] for m in everything(found)] == list(range(int(count)))
+    opened = open_bag(tmp_path / 'bag')
+    assert opened.message_count == int(count) > 0  # all but the chunk that opened no room
+    assert [m[2] for m in everything(opened)] == list(range(int(count)))
     assert counted(tmp_path / 'bag') == int(count)
 
 

@@ -77,13 +77,13 @@ def test_each_further_file_begins_with_the_latched_messages(tmp_path):
 
 def test_the_whole_bag_has_each_message_once(tmp_path):
     bag = write(tmp_path / 'bag', 400, max_duration=0.1)
-    found = open_bag(tmp_path / 'bag')
-    assert found.complete
-    assert everything(found) == expected(400)
+    opened = open_bag(tmp_path / 'bag')
+    assert opened.complete
+    assert everything(opened) == expected(400)
     counts = {'/configuration': 2, '/static': 2, '/odom': 400, '/plain': 1}
-    assert {t.name: t.message_count for t in found.topics} == counts
+    assert {t.name: t.message_count for t in opened.topics} == counts
     assert bag.counts == counts
-    assert bag.message_count == found.message_count == 405
+    assert bag.message_count == opened.message_count == 405
     # metadata.yaml counts what is in the files, as other readers do.
     root = yaml.safe_load((tmp_path / 'bag/metadata.yaml').read_text(encoding='utf-8'))
     assert root['rosbag2_bagfile_information']['message_count'] == 405 + 9

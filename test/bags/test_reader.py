@@ -52,15 +52,15 @@ def test_messages_come_decoded_in_the_order_of_log_times_across_files(tmp_path):
             bag.write(log, text(f'm{n}'), START + n, START)
         bag.flush()
         bag.write(odom, ODOMETRIES[0], START, START)
-    found = open_bag(tmp_path / 'bag')
-    assert (found.start, found.end) == (START, START + 9)
+    opened = open_bag(tmp_path / 'bag')
+    assert (opened.start, opened.end) == (START, START + 9)
     got = [
         (
             m.topic,
             m.log_time - START,
             m.value.data if m.type == STRING else m.value.pose.pose.position.x,
         )
-        for m in found.messages()
+        for m in opened.messages()
     ]
     assert got == [
         ('/odom', 0, 0.0),
@@ -71,10 +71,10 @@ def test_messages_come_decoded_in_the_order_of_log_times_across_files(tmp_path):
         ('/odom', 7, 7.0),
         ('/log', 9, 'm9'),
     ]
-    assert [m.topic for m in found.raw(['/log'])] == ['/log'] * 3
-    assert [m.topic for m in found.raw('/log')] == ['/log'] * 3
-    assert list(found.raw(['/nothing'])) == []
-    assert {t.name: (t.type, t.message_count) for t in found.topics} == {
+    assert [m.topic for m in opened.raw(['/log'])] == ['/log'] * 3
+    assert [m.topic for m in opened.raw('/log')] == ['/log'] * 3
+    assert list(opened.raw(['/nothing'])) == []
+    assert {t.name: (t.type, t.message_count) for t in opened.topics} == {
         '/odom': (ODOMETRY, 4),
         '/log': (STRING, 3),
     }
@@ -86,11 +86,11 @@ def test_a_bag_of_rosbags_is_read(tmp_path):
         for n in range(50):
             bag.write(connection, START + n * STEP, ODOMETRIES[n])
         bag.set_custom_data('a', 'b')
-    found = open_bag(tmp_path / 'bag')
-    assert found.complete
-    assert found.message_count == 50
-    assert found.custom_data == {'a': 'b'}
-    assert [m.value.pose.pose.position.x for m in found.messages()] == list(range(50))
+    opened = open_bag(tmp_path / 'bag')
+    assert opened.complete
+    assert opened.message_count == 50
+    assert opened.custom_data == {'a': 'b'}
+    assert [m.value.pose.pose.position.x for m in opened.messages()] == list(range(50))
 
 
 @pytest.mark.parametrize(
@@ -107,23 +107,23 @@ def test_a_bag_of_rosbags_is_read(tmp_path):
 @pytest.mark.parametrize('end', [True, False])
 def test_a_lone_file_of_others_is_read(tmp_path, options, end):
     mcap_file(tmp_path / 'x.mcap', 700, end=end, **options)
-    found = open_bag(tmp_path / 'x.mcap')
-    assert found.complete == end
-    assert not found.losses
-    assert found.message_count == 700
-    assert everything(found) == [
+    bag = open_bag(tmp_path / 'x.mcap')
+    assert bag.complete == end
+    assert not bag.losses
+    assert bag.message_count == 700
+    assert everything(bag) == [
         ('/odom', START + n, START, ODOMETRIES[n % 500]) for n in range(700)
     ]
-    assert [m.sequence for m in found.raw()] == list(range(700))
+    assert [m.sequence for m in bag.raw()] == list(range(700))
 
 
 def test_a_folder_without_metadata_is_read_in_the_order_of_its_numbers(tmp_path):
     for n in (10, 9, 2):
         mcap_file(tmp_path / f'bag_{n}.mcap', 3)
-    found = open_bag(tmp_path)
-    assert [p.name for p in found.files] == ['bag_2.mcap', 'bag_9.mcap', 'bag_10.mcap']
-    assert not found.complete  # rosbag2 would want metadata.yaml
-    assert found.message_count == 9
+    bag = open_bag(tmp_path)
+    assert [p.name for p in bag.files] == ['bag_2.mcap', 'bag_9.mcap', 'bag_10.mcap']
+    assert not bag.complete  # rosbag2 would want metadata.yaml
+    assert bag.message_count == 9
 
 
 def test_a_file_that_metadata_does_not_list_yet_is_read(tmp_path):
@@ -146,9 +146,9 @@ def test_a_next_file_without_beginning_costs_nothing(tmp_path, content):
     """The recorder was killed, or the power went, just when it was made."""
     write_bag(tmp_path / 'bag', 100)
     (tmp_path / 'bag/bag_1.mcap').write_bytes(content)
-    found = open_bag(tmp_path / 'bag')
-    assert len(everything(found)) == found.message_count == 110
-    assert not found.complete
+    bag = open_bag(tmp_path / 'bag')
+    assert len(everything(bag)) == bag.message_count == 110
+    assert not bag.complete
     report = repair(tmp_path / 'bag', tmp_path / 'made')
     assert report.message_count == 110
     assert report.bytes_lost == len(content)
@@ -160,9 +160,9 @@ def test_torn_metadata_is_taken_for_none(tmp_path):
     whole = (tmp_path / 'bag/metadata.yaml').read_bytes()
     for size in range(0, len(whole), 97):
         (tmp_path / 'bag/metadata.yaml').write_bytes(whole[:size])
-        found = open_bag(tmp_path / 'bag')
-        assert found.message_count == 110
-        assert found.custom_data == {'a': 'b'} or size > len(whole) - 60
+        bag = open_bag(tmp_path / 'bag')
+        assert bag.message_count == 110
+        assert bag.custom_data == {'a': 'b'} or size > len(whole) - 60
 
 
 def edited(tmp_path, **changes) -> None:
@@ -201,11 +201,11 @@ def test_a_folder_whose_files_are_of_another_kind_or_gone_is_named(tmp_path, cha
 )
 def test_the_disk_comes_before_what_metadata_says(tmp_path, changes):
     edited(tmp_path, **changes)
-    found = open_bag(tmp_path / 'bag')
-    assert len(everything(found)) == found.message_count == 11
+    bag = open_bag(tmp_path / 'bag')
+    assert len(everything(bag)) == bag.message_count == 11
     repair(tmp_path / 'bag', tmp_path / 'made')
     made = open_bag(tmp_path / 'made')
-    assert everything(made) == everything(found)
+    assert everything(made) == everything(bag)
     assert made.complete
     assert made.metadata.compression_mode == ''  # its messages and files are not compressed
     assert made.metadata.storage == 'mcap'
@@ -259,10 +259,10 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
         string = writer.register_schema(STRING, 'ros2msg', b'string data')
         writer.add_message(writer.register_channel('/cut', 'cdr', string), 2, b'\0\1\0\0\xff', 2)
         writer.finish()
-    found = open_bag(tmp_path / 'a.mcap')
-    assert found.message_count == 2
-    assert len(list(found.raw())) == 2
+    bag = open_bag(tmp_path / 'a.mcap')
+    assert bag.message_count == 2
+    assert len(list(bag.raw())) == 2
     with pytest.raises(BagError, match="/odd: messages in 'json'"):
-        list(found.messages(['/odd']))
+        list(bag.messages(['/odd']))
     with pytest.raises(BagError, match='/cut at 2 ns is no std_msgs/msg/String'):
-        list(found.messages(['/cut']))
+        list(bag.messages(['/cut']))

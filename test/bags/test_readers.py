@@ -67,38 +67,38 @@ def counts(folder: Path) -> dict[str, int]:
 
 
 def test_rosbags_decodes_every_message(bag):
-    found = dict.fromkeys(counts(bag), 0)
+    decoded = dict.fromkeys(counts(bag), 0)
     with AnyReader([bag]) as reader:
         assert {c.topic: c.msgcount for c in reader.connections} == counts(bag)
         for connection, _, data in reader.messages():
             reader.deserialize(data, connection.msgtype)
-            found[connection.topic] += 1
-    assert found == counts(bag)
+            decoded[connection.topic] += 1
+    assert decoded == counts(bag)
 
 
 def test_mcap_ros2_support_decodes_every_message(bag):
-    found = dict.fromkeys(counts(bag), 0)
+    decoded = dict.fromkeys(counts(bag), 0)
     for path in bag.glob('*.mcap'):
         with path.open('rb') as file:
             reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
             for _, channel, _, _ in reader.iter_decoded_messages():
-                found[channel.topic] += 1
-    assert found == counts(bag)
+                decoded[channel.topic] += 1
+    assert decoded == counts(bag)
 
 
 def test_foxglove_decodes_every_message(bag, foxglove):
-    found = dict.fromkeys(counts(bag), 0)
+    decoded = dict.fromkeys(counts(bag), 0)
     for file in foxglove(*sorted(bag.glob('*.mcap'))):
         assert file['profile'] == 'ros2'
         for name, about in file['topics'].items():
-            found[name] += about['count']
-    assert found == counts(bag)
+            decoded[name] += about['count']
+    assert decoded == counts(bag)
 
 
 def test_this_package_decodes_every_message(bag):
-    found = open_bag(bag)
-    assert found.complete
-    assert sum(1 for _ in found.messages()) == found.message_count == len(everything(found))
+    opened = open_bag(bag)
+    assert opened.complete
+    assert sum(1 for _ in opened.messages()) == opened.message_count == len(everything(opened))
 
 
 def test_a_strict_reader_finds_nothing_to_say(bag):
@@ -114,28 +114,28 @@ def doubts(path: Path):
     schemas: dict[int, Schema] = {}
     messages: dict[int, int] = {}
     with path.open('rb') as file:
-        found = list(StreamReader(file, emit_chunks=True, validate_crcs=True).records)
-    end = next(n for n, r in enumerate(found) if isinstance(r, DataEnd))
-    for record in found[:end]:
+        records = list(StreamReader(file, emit_chunks=True, validate_crcs=True).records)
+    end = next(n for n, r in enumerate(records) if isinstance(r, DataEnd))
+    for record in records[:end]:
         if isinstance(record, (Channel, Schema)):
             yield from _define(record, channels, schemas)
         elif isinstance(record, Chunk):
             yield from _check_chunk(record, channels, schemas, messages)
         elif isinstance(record, MessageIndex) and not record.records:
             yield 'an empty message index'
-    repeated = [r for r in found[end:] if isinstance(r, (Channel, Schema))]
+    repeated = [r for r in records[end:] if isinstance(r, (Channel, Schema))]
     for record in repeated:
         known = channels if isinstance(record, Channel) else schemas
         if known.get(record.id) != record:
             yield f'{record} is in the summary alone'
-    [statistics] = [r for r in found[end:] if isinstance(r, Statistics)]
+    [statistics] = [r for r in records[end:] if isinstance(r, Statistics)]
     if messages != statistics.channel_message_counts:
         yield f'{messages} messages there, {statistics.channel_message_counts} counted'
     if sum(messages.values()) != statistics.message_count:
         yield 'messages are not counted right'
     if [len(channels), len(schemas)] != [statistics.channel_count, statistics.schema_count]:
         yield 'definitions are not counted right'
-    if sum(isinstance(r, Chunk) for r in found) != statistics.chunk_count:
+    if sum(isinstance(r, Chunk) for r in records) != statistics.chunk_count:
         yield 'chunks are not counted right'
 
 

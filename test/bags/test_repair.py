@@ -167,8 +167,8 @@ def test_the_program_says_what_it_kept_and_lost(killed, tmp_path):
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0] == f'{killed} -> {tmp_path / "made"}'
-    found = open_bag(tmp_path / 'made')
-    assert lines[1].split() == ['/odom', str(found.message_count), 'messages']
+    bag = open_bag(tmp_path / 'made')
+    assert lines[1].split() == ['/odom', str(bag.message_count), 'messages']
     assert 'killed_1.mcap: ' in lines[-1]
     assert done.stdout.count('lost') == 1
 

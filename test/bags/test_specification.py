@@ -42,16 +42,16 @@ CONTENTS = {
 
 def official(path: Path) -> dict[type, list]:
     """What the reader of the `mcap` package finds in the data section."""
-    found: dict[type, list] = {
+    records: dict[type, list] = {
         kind: [] for kind in (Message, Schema, Channel, Attachment, Metadata)
     }
     with path.open('rb') as file:
         for record in StreamReader(file, validate_crcs=True).records:
             if isinstance(record, DataEnd):
                 break
-            if type(record) in found and record not in found[type(record)]:
-                found[type(record)].append(record)
-    return found
+            if type(record) in records and record not in records[type(record)]:
+                records[type(record)].append(record)
+    return records
 
 
 def check(path: Path, target: Path, messages: int) -> None:

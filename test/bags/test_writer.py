@@ -106,9 +106,9 @@ def test_flushed_messages_are_there_while_the_bag_is_being_written(tmp_path):
         assert open_bag(tmp_path / 'bag').message_count == 0
         bag.flush()
         bag.write(odom, ODOMETRIES[1], START + 1, START)
-        found = open_bag(tmp_path / 'bag')
-        assert everything(found) == [('/odom', START, START, ODOMETRIES[0])]
-        assert not found.complete
+        opened = open_bag(tmp_path / 'bag')
+        assert everything(opened) == [('/odom', START, START, ODOMETRIES[0])]
+        assert not opened.complete
         assert told_by(tmp_path / 'bag')['message_count'] == 1
         assert bag.message_count == 2
         assert (bag.start, bag.end) == (START, START)
@@ -170,9 +170,13 @@ def test_attachments_are_read_back_by_foxglove(tmp_path, foxglove):
         bag.write(odom, ODOMETRIES[0], 1, 1)
         bag.attach('sim.yaml', 'text/yaml', b'speed: 15\n', log_time=7, create_time=5)
         bag.write(odom, ODOMETRIES[1], 2, 2)
-    [found] = open_bag(tmp_path / 'bag').attachments
-    assert (found.name, found.media_type, found.data) == ('sim.yaml', 'text/yaml', b'speed: 15\n')
-    assert (found.log_time, found.create_time) == (7, 5)
+    [attachment] = open_bag(tmp_path / 'bag').attachments
+    assert (attachment.name, attachment.media_type, attachment.data) == (
+        'sim.yaml',
+        'text/yaml',
+        b'speed: 15\n',
+    )
+    assert (attachment.log_time, attachment.create_time) == (7, 5)
     [file] = foxglove(tmp_path / 'bag/bag_0.mcap')
     assert file['attachments'] == [{'name': 'sim.yaml', 'text': 'speed: 15\n'}]
     assert file['topics']['/odom']['count'] == 2

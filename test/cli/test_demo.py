@@ -37,15 +37,15 @@ def start(folder, *arguments):
 
 def descendants(pid):
     """Return the processes whose parent is `pid`."""
-    found = []
+    processes = []
     for path in Path('/proc').glob('[0-9]*/stat'):
         try:
             parent = int(path.read_text().rpartition(')')[2].split()[1])
         except OSError:
             continue
         if parent == pid:
-            found.append(int(path.parent.name))
-    return found
+            processes.append(int(path.parent.name))
+    return processes
 
 
 def is_running(pid):

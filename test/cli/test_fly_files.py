@@ -31,15 +31,15 @@ def test_the_csv_holds_the_numbers_of_the_document(fly, document, tmp_path, argu
     result = fly('--csv', path, *arguments)
     assert (result.code, result.err) == (0, '')
     head, rows = table_of(path)
-    found = document(*arguments)
+    flown = document(*arguments)
     columns = {}
     for name, shape in ARRAYS.items():
         if shape:
             quantity, unit = name.split('_', 1)
             for i, axis in enumerate('xyz'):
-                columns[f'{quantity}_{axis}_{unit}'] = [row[i] for row in found[name]]
+                columns[f'{quantity}_{axis}_{unit}'] = [row[i] for row in flown[name]]
         else:
-            columns[name] = found[name]
+            columns[name] = flown[name]
     assert head == list(columns)
     assert rows == [list(row) for row in zip(*columns.values(), strict=True)]
     assert f'{path}, {len(rows)} rows' in result.out

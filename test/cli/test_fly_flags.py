@@ -16,12 +16,12 @@ pytestmark = pytest.mark.usefixtures('compiled')
 
 
 def test_without_air_the_flight_is_a_parabola(document):
-    found = document('--air-density', 0, '--gravity', 5, '--speed', 12, '--pitch', 30)
+    flown = document('--air-density', 0, '--gravity', 5, '--speed', 12, '--pitch', 30)
     sine, cosine = 0.5, math.sqrt(0.75)
-    assert found['flight_time_s'] == pytest.approx(2 * 12 * sine / 5, abs=ROUNDING)
-    assert found['range_m'] == pytest.approx(12 * cosine * 2 * 12 * sine / 5, abs=ROUNDING)
-    assert found['apex_m'] == pytest.approx((12 * sine) ** 2 / (2 * 5), abs=ROUNDING)
-    assert found['end_spin_rad_s'] == 31.416
+    assert flown['flight_time_s'] == pytest.approx(2 * 12 * sine / 5, abs=ROUNDING)
+    assert flown['range_m'] == pytest.approx(12 * cosine * 2 * 12 * sine / 5, abs=ROUNDING)
+    assert flown['apex_m'] == pytest.approx((12 * sine) ** 2 / (2 * 5), abs=ROUNDING)
+    assert flown['end_spin_rad_s'] == 31.416
 
 
 def test_yaw_turns_the_whole_flight_to_the_right(document):
@@ -49,16 +49,16 @@ def test_the_mirrored_throw_flies_the_mirrored_flight(document):
 
 def at(key: str, t: float) -> Callable[[dict], float]:
     """Return a function that reads a quantity at a time; there are 10 samples a second."""
-    return lambda found: found[key][round(10 * t)]
+    return lambda flight: flight[key][round(10 * t)]
 
 
 def side(t: float) -> Callable[[dict], float]:
     """Return a function that reads how far left the disc is at a time."""
-    return lambda found: found['position_m'][round(10 * t)][1]
+    return lambda flight: flight['position_m'][round(10 * t)][1]
 
 
 def key(name: str) -> Callable[[dict], float]:
-    return lambda found: found[name]
+    return lambda flight: flight[name]
 
 
 @pytest.mark.parametrize(
@@ -109,8 +109,8 @@ def test_rates_at_release_start_the_disc_turning(document):
         ('--roll-rate', 'roll_deg', 'pitch_deg'),
         ('--pitch-rate', 'pitch_deg', 'roll_deg'),
     ):
-        found = document(flag, 2, '--samples', 1000)
-        turned = {key: found[key][1] - found[key][0] for key in (key_, other)}
+        flown = document(flag, 2, '--samples', 1000)
+        turned = {key: flown[key][1] - flown[key][0] for key in (key_, other)}
         # 2 rad/s for 1 ms, of which the damping of 24 1/s takes 1.2 %, and of the other the
         # nutation of 63 rad/s: 2 * 63 * t^2 / 2.
         assert turned[key_] == pytest.approx(math.degrees(2e-3), rel=0.02)
@@ -173,16 +173,16 @@ def test_the_largest_seed_is_accepted(document):
 
 @pytest.mark.parametrize('ratio', [0.5, -0.25, 0.0])
 def test_the_advance_ratio_gives_the_spin(document, ratio):
-    found = document('--advance-ratio', ratio, '--speed', 12)
+    flown = document('--advance-ratio', ratio, '--speed', 12)
     spin = 2 * 12 * ratio / DIAMETER  # eqn 63
-    assert found['launch']['spin_rad_s'] == pytest.approx(spin, rel=1e-15)
-    same = document('--spin', repr(found['launch']['spin_rad_s']), '--speed', 12)
-    assert found == same
+    assert flown['launch']['spin_rad_s'] == pytest.approx(spin, rel=1e-15)
+    same = document('--spin', repr(flown['launch']['spin_rad_s']), '--speed', 12)
+    assert flown == same
 
 
 def test_the_advance_ratio_uses_the_diameter_of_the_disc(document):
-    found = document('--advance-ratio', 0.5, '--disc', 'wraith')
-    assert found['launch']['spin_rad_s'] == pytest.approx(2 * 15 * 0.5 / 0.211, rel=1e-15)
+    flown = document('--advance-ratio', 0.5, '--disc', 'wraith')
+    assert flown['launch']['spin_rad_s'] == pytest.approx(2 * 15 * 0.5 / 0.211, rel=1e-15)
 
 
 def test_at_speed_0_only_the_advance_ratio_0_is_accepted(document):
@@ -192,11 +192,11 @@ def test_at_speed_0_only_the_advance_ratio_0_is_accepted(document):
 def test_a_disc_file_of_the_user_flies(document, tmp_path):
     path = tmp_path / 'my disc.yaml'
     path.write_text('based_on: frisbee\nmass_kg: 1.75e-1\n', encoding='utf-8')
-    found = document('--disc', path)
-    assert found['launch'].pop('disc') == str(path)  # so that it can be flown again
+    answer = document('--disc', path)
+    assert answer['launch'].pop('disc') == str(path)  # so that it can be flown again
     default = document()
     default['launch'].pop('disc')
-    assert found == default
+    assert answer == default
 
 
 @pytest.mark.parametrize(
