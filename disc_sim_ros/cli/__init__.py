@@ -1,1 +1,1 @@
-"""Command-line programs: each module has a thin `main`."""
+"""Command-line programs: one module for each, with a thin `main`."""

@@ -1,4 +1,4 @@
-"""What programs write: files whole or not at all, and text on stdout without tracebacks."""
+"""Output of programs: files, complete or not at all, and text on stdout and stderr."""
 
 import argparse
 from collections.abc import Iterator
@@ -92,14 +92,14 @@ def write_whole(flag: str, name: str, content: bytes) -> None:
 
 
 class ClosedStdoutError(Exception):
-    """The reader of stdout has gone away, as `head` does when it has enough."""
+    """The reader of stdout has closed it, as `head` does after its last line."""
 
 
 def show(text: str) -> None:
     """Print text to stdout at once.
 
     Raises:
-        ClosedStdoutError: The reader has gone away.
+        ClosedStdoutError: The reader has closed stdout.
         DiscSimError: The system refuses, for instance for lack of space.
     """
     with _one_line_errors():
@@ -116,7 +116,7 @@ def flushed_stdout() -> Iterator[None]:
     """Flush stdout at the end of the block, where its errors can still be reported.
 
     Raises:
-        ClosedStdoutError: The reader has gone away.
+        ClosedStdoutError: The reader has closed stdout.
         DiscSimError: The system refuses, for instance for lack of space.
     """
     try:
@@ -160,7 +160,7 @@ def _is_special(path: Path) -> bool:
 
 @contextmanager
 def _one_line_errors() -> Iterator[None]:
-    """Translate what the system says of stdout, and discard what is left in its buffer."""
+    """Translate errors of stdout, and discard the rest of its buffer."""
     try:
         yield
     except OSError as error:

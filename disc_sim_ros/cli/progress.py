@@ -1,4 +1,4 @@
-"""A line on the terminal that says how far a long computation is and how long it still takes."""
+"""A progress bar for long computations, with the rate and the time left."""
 
 import sys
 import time
@@ -12,8 +12,9 @@ class ProgressBar:
     """Shows finished and all flights, the rate and the time left.
 
     Args:
-        prog: Name of the program, for logs.
-        stream: Where to; a bar that renews itself on a terminal, else a line every 10 s.
+        prog: Name of the program, for lines that are not on a terminal.
+        stream: Stream to write to; None for stderr. On a terminal the bar is one line that is
+            updated, otherwise a new line appears every 10 s.
     """
 
     def __init__(self, prog: str, stream: TextIO | None = None) -> None:
@@ -28,7 +29,7 @@ class ProgressBar:
 
     @property
     def new(self) -> int:
-        """Return the flights that were finished since the first call."""
+        """Return the number of flights finished since the first call."""
         return self.done - self._first[1] if self._first else 0
 
     def finish(self) -> None:
@@ -39,7 +40,7 @@ class ProgressBar:
             self._shown = False
 
     def __call__(self, done: int, total: int) -> None:
-        """Tell how many flights are finished of how many."""
+        """Show the number of finished flights and of all flights."""
         self.done, self.total = done, total
         now = time.monotonic()
         if self._first is None:
@@ -54,7 +55,7 @@ class ProgressBar:
 
 
 def progress_text(done: int, total: int, new: int, seconds: float) -> str:
-    """Return the line: a bar, the share, the flights, the rate of the new ones, the time left."""
+    """Return a line with the bar, the share, the flights, the rate and the time left."""
     full = _WIDTH * done // max(total, 1)
     text = f'[{"#" * full}{"." * (_WIDTH - full)}] {done / max(total, 1):4.0%} '
     text += f'{done} of {total} flights'
@@ -65,7 +66,7 @@ def progress_text(done: int, total: int, new: int, seconds: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time for people: 8 s, 3 min 20 s, 2 h 5 min."""
+    """Return a duration to read: 8 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f'{whole} s'

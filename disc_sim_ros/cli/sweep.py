@@ -41,7 +41,7 @@ def parser(prog: str = 'sweep') -> Parser:
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     study_flags.add_throw(p)
-    what = p.add_argument_group('what differs from flight to flight')
+    what = p.add_argument_group('differences from flight to flight')
     text = 'values of a grid quantity; several quantities span the grid'
     study_flags.add_list(what, '--vary', 'NAME=START:STOP:STEP|START:STOP/N|A,B,C', text)
     study_flags.add_list(what, '--normal', 'NAME=MEAN,SD', 'normal scatter')

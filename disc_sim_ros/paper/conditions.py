@@ -1,4 +1,4 @@
-"""What all figures share: the disc, the model and the launches of the paper, and sampled curves.
+"""Common parts of all figures: disc, model and launches of the paper, and sampled curves.
 
 The paper uses the constant-spin model unless its text says otherwise, and so do the figures. Each
 flight is computed with the printed roll and pitch damping and with a tenth of it, which agrees

@@ -74,7 +74,7 @@ class Data:
 
 
 def compute_turn() -> Data:
-    """Fly the turn without ground: it goes on below the launch."""
+    """Fly the turn without ground: it continues below the launch."""
 
     def turn(label: str, share: float, **options: str) -> Curve:
         flight = conditions.flown(

@@ -1,1 +1,1 @@
-"""Ensembles of flights: grids and human scatter, flown in batches, kept in one file."""
+"""Studies: ensembles of flights on grids and with scatter, and the search of the best launch."""

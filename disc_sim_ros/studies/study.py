@@ -117,7 +117,7 @@ class Study:
         return self.setup.wind.turbulence > 0.0 and self.gusts == EACH
 
     def values(self, start: int, stop: int) -> dict[str, FloatArray]:
-        """Return what differs in flights `start` to `stop`, by name; shape (stop - start,)."""
+        """Return the values that differ, of flights `start` to `stop`, by name; shape (n,)."""
         index = np.arange(start, stop)
         columns: dict[str, FloatArray] = {}
         if self.vary:
