@@ -100,15 +100,12 @@ setup(
     python_requires='>=3.11',
     install_requires=[
         'numpy>=1.26,<3',
-        'numba>=0.60,<1',
         'PyYAML>=6.0,<7',
-        'matplotlib>=3.8,<4',
-        'llvmlite>=0.43,<1',
-        'lz4>=4.3,<5',
+        'matplotlib>=3.6,<4',
+        'lz4>=4.0.2,<5',
         'mcap>=1.2,<2',
         'mcap-ros2-support>=0.5.5,<1',
         'Pillow>=9.1',
-        'pyarrow>=15,<30',
         'scipy>=1.11,<2',
         'zstandard>=0.22,<1',
     ],
@@ -119,6 +116,10 @@ setup(
             'ros-jazzy-rclpy[fastrtps]',
             'ros-jazzy-common-interfaces',
         ],
+        # Compiled equations, hundreds of times faster.
+        'fast': ['llvmlite>=0.43,<1', 'numba>=0.60,<1'],
+        # Parquet tables of `sweep`.
+        'parquet': ['pyarrow>=15,<30'],
         # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
         # `make docs`.

@@ -26,8 +26,14 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[1]
 PAGE, LOCK = ROOT / 'docs' / 'dependencies.md', ROOT / 'requirements-dev.lock'
 BEGIN, END = '<!-- tables: tools/dependencies.py --write -->', '<!-- end of tables -->'
-EXTRAS = ('jazzy', 'dask', 'test', 'docs')  # of the development environment
-DISTRIBUTED = ('', 'jazzy', 'dask')  # what users run; the other extras are tools
+EXTRAS = ('jazzy', 'fast', 'parquet', 'dask', 'test', 'docs')  # of the development environment
+DISTRIBUTED = (
+    '',
+    'jazzy',
+    'fast',
+    'parquet',
+    'dask',
+)  # what users run; the other extras are tools
 RENEW = 'run `make lock`, then `make test`'
 WHY = {
     'atheris': 'coverage-guided fuzzing, `benchmarks/fuzz`',

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 import json
 import sys
 import time
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.studies.study import Study
 
 DEFAULT_COUNT = 1000  # samples, where a quantity scatters
-DEFAULT_OUTPUT = 'sweep.parquet'
+DEFAULT_OUTPUT = 'sweep.parquet' if find_spec('pyarrow') else 'sweep.csv'
 
 
 def parser(prog: str = 'sweep') -> Parser:
@@ -78,7 +79,10 @@ def parser(prog: str = 'sweep') -> Parser:
         help='flights that a worker flies and stores at a time (default: 8192)',
     )
     made.add_argument(
-        '--output', default=DEFAULT_OUTPUT, metavar='FILE', help='ends in .parquet or .csv'
+        '--output',
+        default=DEFAULT_OUTPUT,
+        metavar='FILE',
+        help='ends in .parquet (needs pyarrow) or .csv',
     )
     made.add_argument(
         '--force', action='store_true', help='overwrite FILE, and discard an unfinished sweep'

@@ -64,8 +64,7 @@ def sweep(
         KeyboardInterrupt: Ctrl-C; finished flights are kept.
     """
     path = Path(output)
-    if path.suffix.lower() not in tables.SUFFIXES:
-        raise ConfigError('output', str(output), 'the name must end in .parquet or .csv')
+    tables.check_output(path)
     with _opened(path, study, batch, resume=resume, force=force) as parts:
         if parts is None:
             return path

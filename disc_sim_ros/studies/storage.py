@@ -1,8 +1,8 @@
 """Storage of an unfinished sweep: a folder of finished batches that outlives the process.
 
-Each part is a complete Parquet file that appears by a rename. If the process is killed, or the
-disk is full, or the power fails, only the batches in progress are lost. The manifest holds the
-study.
+Each part is a complete Parquet file, or an NPZ file without pyarrow, that appears by a rename. If
+the process is killed, or the disk is full, or the power fails, only the batches in progress are
+lost. The manifest holds the study.
 """
 
 from contextlib import suppress
@@ -21,7 +21,7 @@ from disc_sim_ros.studies import tables
 from disc_sim_ros.studies.study import Study, study_differences, study_document
 
 DEFAULT_BATCH = 8192  # flights; half a second on one core, 1 MB
-_PART = re.compile(r'(\d{10})\.parquet')
+_PART = re.compile(r'(\d{10})\.(parquet|npz)')
 _MANIFEST = 'question.json'  # as since 0.1: an older folder must not pass for an empty one
 
 
@@ -47,6 +47,7 @@ class Parts:
         self.output = output
         self.folder = output.with_name(f'{output.name}.parts')
         self.study = study
+        self._suffix = tables.part_suffix()
         if force and not resume:
             shutil.rmtree(self.folder, ignore_errors=True)
         manifest = self._manifest()
@@ -90,7 +91,7 @@ class Parts:
 
     def path(self, number: int) -> Path:
         """Return the path of a part."""
-        return self.folder / f'{number:010d}.parquet'
+        return self.folder / f'{number:010d}{self._suffix}'
 
     def keep(self, number: int, columns: tables.Columns) -> None:
         """Write a finished part.
@@ -99,7 +100,7 @@ class Parts:
             DiscSimError: The system refuses, for instance for lack of space.
         """
         try:
-            write_whole(self.path(number), tables.parquet_bytes(columns))
+            write_whole(self.path(number), tables.part_bytes(columns))
         except OSError as error:
             raise DiscSimError(f'cannot write {self.path(number)} ({reason(error)})') from None
         self.done.add(number)
@@ -175,6 +176,10 @@ class Parts:
         for path in self.folder.iterdir():
             match = _PART.fullmatch(path.name)
             number = int(match[1]) if match else -1
+            if match and path.suffix != self._suffix:
+                pyarrow = 'with' if path.suffix == '.parquet' else 'without'
+                allowed = f'{self.folder} was begun {pyarrow} pyarrow: resume it so; or --force'
+                raise ConfigError('resume', str(self.output), allowed)
             if match and number < self.batches:
                 start, stop = self.span(number)
                 if tables.rows_of(path) == stop - start:

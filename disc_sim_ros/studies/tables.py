@@ -1,14 +1,17 @@
 """Tables of flights: Parquet and CSV, written and read in chunks to limit the memory."""
 
 from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.studies import plain_tables
 from disc_sim_ros.studies.columns import STATUS
 from disc_sim_ros.studies.study import Study, study_document
 
@@ -20,6 +23,35 @@ Columns = dict[str, NDArray[Any]]
 SUFFIXES = ('.parquet', '.csv')
 METADATA_KEY = b'disc_sim_ros'
 _ROWS = 65536  # least rows of a chunk
+
+
+def has_pyarrow() -> bool:
+    """Return True if pyarrow is installed; without it there is CSV, but no Parquet."""
+    return find_spec('pyarrow') is not None
+
+
+def part_suffix() -> str:
+    """Return how the names of parts end that this process writes."""
+    return SUFFIXES[0] if has_pyarrow() else plain_tables.SUFFIX
+
+
+def check_output(path: Path) -> None:
+    """Check that a file of flights can be written or read.
+
+    Raises:
+        ConfigError: Its name has another ending, or it needs pyarrow, which is not installed.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ConfigError('output', str(path), 'the name must end in .parquet or .csv')
+    if suffix == SUFFIXES[0] and not has_pyarrow():
+        allowed = 'Parquet needs pyarrow, which is not installed; install it, or end it in .csv'
+        raise ConfigError('output', str(path), allowed)
+
+
+def part_bytes(columns: Columns) -> bytes:
+    """Return flights as the bytes of a part, whose name ends in `part_suffix()`."""
+    return parquet_bytes(columns) if has_pyarrow() else plain_tables.part_bytes(columns)
 
 
 def parquet_bytes(columns: Columns) -> bytes:
@@ -38,7 +70,7 @@ def join(parts: Sequence[Path], target: Path, suffix: str, study: Study) -> None
     """Write the flights of `parts` to one file, one part at a time.
 
     Args:
-        parts: Parquet files, in order.
+        parts: Files of `part_bytes`, in order.
         target: File to write.
         suffix: '.parquet' (one row group for each part) or '.csv' (one header line).
         study: Study of the flights; stored in the metadata of a Parquet file, and in NAME.json
@@ -47,20 +79,13 @@ def join(parts: Sequence[Path], target: Path, suffix: str, study: Study) -> None
     Raises:
         OSError: The system refuses.
     """
-    from pyarrow import csv, parquet  # noqa: PLC0415
-
     with target.open('wb') as file:
-        if suffix == '.csv':
-            file.write((','.join(parquet.read_schema(parts[0]).names) + '\n').encode())
-            options = csv.WriteOptions(include_header=False, quoting_style='none')
-            for path in parts:
-                csv.write_csv(_plain(parquet.read_table(path)), file, options)
+        if suffix == '.csv' and not has_pyarrow():
+            plain_tables.join_csv(parts, file)
+        elif suffix == '.csv':
+            _join_csv(parts, file)
         else:
-            schema = parquet.read_schema(parts[0]).with_metadata(_metadata(study))
-            with parquet.ParquetWriter(file, schema, compression='zstd') as writer:
-                for path in parts:
-                    table = parquet.read_table(path)
-                    writer.write_table(table, row_group_size=len(table))
+            _join_parquet(parts, file, study)
         file.flush()
         os.fsync(file.fileno())
     if suffix == '.csv':
@@ -70,11 +95,33 @@ def join(parts: Sequence[Path], target: Path, suffix: str, study: Study) -> None
         )
 
 
+def _join_csv(parts: Sequence[Path], file: BinaryIO) -> None:
+    from pyarrow import csv, parquet  # noqa: PLC0415
+
+    file.write((','.join(parquet.read_schema(parts[0]).names) + '\n').encode())
+    options = csv.WriteOptions(include_header=False, quoting_style='none')
+    for path in parts:
+        csv.write_csv(_plain(parquet.read_table(path)), file, options)
+
+
+def _join_parquet(parts: Sequence[Path], file: BinaryIO, study: Study) -> None:
+    from pyarrow import parquet  # noqa: PLC0415
+
+    schema = parquet.read_schema(parts[0]).with_metadata(_metadata(study))
+    with parquet.ParquetWriter(file, schema, compression='zstd') as writer:
+        for path in parts:
+            table = parquet.read_table(path)
+            writer.write_table(table, row_group_size=len(table))
+
+
 def chunks(path: Path, names: Sequence[str]) -> Iterator[Columns]:
     """Yield the columns `names` of the flights of a file, some thousand flights at a time.
 
     `status` is given as numbers, an index of `columns.STATUS`.
     """
+    if path.suffix.lower() == '.csv' and not has_pyarrow():
+        yield from plain_tables.csv_chunks(path, names)
+        return
     if path.suffix.lower() == '.csv':
         from pyarrow import csv  # noqa: PLC0415
 
@@ -112,7 +159,9 @@ def sidecar(path: Path) -> Path:
 
 
 def rows_of(path: Path) -> int:
-    """Return the number of flights in a Parquet file; -1 if it is damaged."""
+    """Return the number of flights in a part; -1 if it is damaged."""
+    if not has_pyarrow():
+        return plain_tables.rows_of(path)
     from pyarrow import parquet  # noqa: PLC0415
 
     try:

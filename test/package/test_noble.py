@@ -1,0 +1,71 @@
+"""With the versions of Ubuntu 24.04 and without numba and pyarrow it flies, sweeps and records."""
+
+import csv
+import json
+from pathlib import Path
+import platform
+import re
+import sys
+import venv
+
+import pytest
+
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
+from package.sources import ROOT
+from package.test_install import copy_source, run
+
+pytestmark = [
+    pytest.mark.xdist_group('noble'),
+    pytest.mark.skipif(
+        sys.version_info[:2] != (3, 11) or platform.machine() != 'x86_64',
+        reason='PyPI has wheels of these versions for Python 3.11 on x86-64 alone',
+    ),
+]
+CONSTRAINTS = ROOT / 'test/package/noble.txt'
+OPTIONAL = ('numba', 'llvmlite', 'pyarrow', 'dask')
+
+
+@pytest.fixture(scope='module')
+def noble(tmp_path_factory) -> Path:
+    """Return an environment with exactly the versions of apt, and ROS."""
+    pytest.importorskip('rclpy')
+    folder = tmp_path_factory.mktemp('noble')
+    source = copy_source(folder / 'source')
+    prefix = folder / 'prefix'
+    venv.create(prefix, with_pip=True, symlinks=True)
+    pip = (prefix / 'bin/python', '-m', 'pip', '--disable-pip-version-check', 'install')
+    run(*pip, '--no-compile', '-c', CONSTRAINTS, f'{source}[jazzy]', cwd=folder)
+    return prefix
+
+
+def test_the_versions_are_those_of_apt(noble, tmp_path):
+    frozen = run(noble / 'bin/python', '-m', 'pip', 'freeze', cwd=tmp_path).splitlines()
+    pins = [line for line in CONSTRAINTS.read_text().splitlines() if '==' in line]
+    assert pins
+    assert set(pins) <= set(frozen)
+    assert not {line.partition('==')[0] for line in frozen} & set(OPTIONAL)
+
+
+def test_it_flies_as_compiled(noble, tmp_path):
+    document = json.loads(run(noble / 'bin/fly', '--json', cwd=tmp_path))
+    landed = fly(Launch(), Setup(disc=disc_file.load_disc('frisbee')))
+    assert document['flight_time_s'] == pytest.approx(landed.time, rel=1e-12)
+
+
+def test_it_sweeps_to_csv_and_names_what_parquet_needs(noble, tmp_path):
+    some = ('--scatter', 'speed=1', '--count', '5', '--seed', '1')
+    run(noble / 'bin/sweep', *some, cwd=tmp_path)
+    with (tmp_path / 'sweep.csv').open(encoding='utf-8') as file:
+        rows = list(csv.DictReader(file))
+    assert [row['status'] for row in rows] == ['landed'] * 5
+    assert len({row['speed_m_s'] for row in rows}) == 5
+    run(noble / 'bin/sweep', *some, '--output', 'a.parquet', cwd=tmp_path, code=2)
+
+
+def test_a_node_flies_in_real_time_and_its_bag_is_verified(noble, tmp_path):
+    shown = run(noble / 'bin/demo', cwd=tmp_path, HOME=str(tmp_path))
+    assert re.search(r'recorded \d+ messages of \d+ topics, .*, nothing lost', shown)
+    assert 'identical to the last bit' in shown
+    assert len(list(tmp_path.glob('flights/*/flight.png'))) == 1
