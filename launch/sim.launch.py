@@ -1,14 +1,21 @@
-"""Start sim_node, and on demand RViz: ros2 launch disc_sim_ros sim.launch.py disc:=wraith.
+"""Start sim_node, and on demand RViz: ros2 launch disc_sim_ros sim.launch.py sim.disc:=wraith.
 
-Every parameter of sim_node is an argument of the same name; --show-args lists them. A parameter
-without an argument has its value of params_file.
+Every parameter of sim_node is an argument; --show-args lists them. A name without a dot gets
+`sim.` in front, so that it is no argument of an including file: `sim.disc`, but `launch.speed`. A
+parameter without an argument has its value of params_file. To include this file twice, put each
+into a GroupAction with scoped=True and forwarding=False, as two_discs.launch.py does.
 """
 
 from pathlib import Path
 from typing import Any
 
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.actions import (
+    DeclareLaunchArgument,
+    OpaqueFunction,
+    Shutdown,
+    UnsetLaunchConfiguration,
+)
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -16,11 +23,13 @@ from launch_ros.parameter_descriptions import ParameterValue
 import yaml
 
 from disc_sim_ros import topics
+from disc_sim_ros.ros.launch_arguments import argument_of, is_started_directly, refuse_unknown
 from disc_sim_ros.ros.parameter_spec import ParameterSpec, allowed_text, plain
 from disc_sim_ros.ros.sim.parameters import TABLE
 
 SHARE = Path(__file__).parents[1]  # launch/, config/, rviz/ and urdf/ are side by side there
 NOT_GIVEN = ''
+WITH_THIS = ('sim_and_recorder.launch.py', 'two_discs.launch.py')  # they check their arguments
 
 ARGUMENTS = {
     'namespace': ('', 'Namespace of all nodes, such as red.'),
@@ -43,10 +52,14 @@ def generate_launch_description() -> LaunchDescription:
         for name, (default, text) in ARGUMENTS.items()
     ]
     passed_on = [
-        DeclareLaunchArgument(spec.name, default_value=NOT_GIVEN, description=description(spec))
+        DeclareLaunchArgument(
+            argument_of(spec.name), default_value=NOT_GIVEN, description=description(spec)
+        )
         for spec in TABLE
     ]
-    return LaunchDescription([*own, *passed_on, OpaqueFunction(function=nodes)])
+    # Otherwise a second inclusion would get the arguments of the first one.
+    forgotten = [UnsetLaunchConfiguration(argument_of(spec.name)) for spec in TABLE]
+    return LaunchDescription([*own, *passed_on, OpaqueFunction(function=nodes), *forgotten])
 
 
 def description(spec: ParameterSpec) -> str:
@@ -58,7 +71,10 @@ def description(spec: ParameterSpec) -> str:
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    """Return the nodes for the given arguments."""
+    """Return the nodes for the given arguments; refuse misspelt ones."""
+    if is_started_directly(__file__) or not any(map(is_started_directly, WITH_THIS)):
+        known = [*ARGUMENTS, *(argument_of(spec.name) for spec in TABLE)]
+        refuse_unknown(context.argv, known, direct=is_started_directly(__file__))
     given = given_parameters(context.launch_configurations)
     namespace = LaunchConfiguration('namespace')
     # Not for sim_node, which must not wait for its own /clock.
@@ -94,7 +110,7 @@ def nodes(context: LaunchContext) -> list[Node]:
 
 def given_parameters(arguments: dict[str, str]) -> dict[str, Any]:
     """Return the parameters of sim_node that are given as arguments, read as YAML."""
-    given = {spec.name: arguments[spec.name] for spec in TABLE}
+    given = {spec.name: arguments[argument_of(spec.name)] for spec in TABLE}
     return {name: yaml.safe_load(text) for name, text in given.items() if text != NOT_GIVEN}
 
 

@@ -2,10 +2,12 @@
 
 ros2 launch disc_sim_ros sim_and_recorder.launch.py bag:=my_bag launch.speed:=20
 
-It takes all arguments of sim.launch.py except auto_throw. The bag holds every topic, as MCAP.
+It takes all arguments of sim.launch.py except sim.auto_throw. The bag holds every topic, as MCAP.
 """
 
+from datetime import datetime
 from pathlib import Path
+import sys
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
@@ -13,19 +15,24 @@ from launch.actions import (
     ExecuteProcess,
     IncludeLaunchDescription,
     OpaqueFunction,
-    TimerAction,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
+from disc_sim_ros.ros.launch_arguments import argument_of, is_started_directly, refuse_unknown
+from disc_sim_ros.ros.recorder.options import default_bag
+from disc_sim_ros.ros.sim.parameters import TABLE
+
 ARGUMENTS = {
     'bag': ('', 'New folder for the bag; empty: bags/disc_DATE_TIME in the current folder.'),
     'throw_after': (
-        '3.0',
-        'Time before the throw, in which the recorder subscribes to all topics. Unit: s. '
+        '0.0',
+        'Time from the moment when the recorder records all topics to the throw. Unit: s. '
         'Negative: no throw.',
     ),
 }
+
+OF_SIMULATOR = ('namespace', 'params_file', 'rviz', 'robot_state_publisher')
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -36,31 +43,28 @@ def generate_launch_description() -> LaunchDescription:
     ]
     simulator = IncludeLaunchDescription(
         PythonLaunchDescriptionSource(str(Path(__file__).with_name('sim.launch.py'))),
-        launch_arguments={'auto_throw': 'false'}.items(),
+        launch_arguments={'sim.auto_throw': 'false'}.items(),
     )
-    return LaunchDescription([*own, simulator, OpaqueFunction(function=record_and_throw)])
+    return LaunchDescription([*own, OpaqueFunction(function=record_and_throw), simulator])
 
 
-def record_and_throw(context: LaunchContext) -> list[Node | TimerAction]:
-    """Return the recorder and the delayed call of the throw."""
+def record_and_throw(context: LaunchContext) -> list[Node | ExecuteProcess]:
+    """Return the recorder and the program that throws; refuse misspelt arguments."""
+    known = [*ARGUMENTS, *OF_SIMULATOR, *(argument_of(spec.name) for spec in TABLE)]
+    refuse_unknown(context.argv, known, direct=is_started_directly(__file__))
     arguments = context.launch_configurations
+    namespace = arguments.get('namespace', '')
+    bag = arguments['bag'] or default_bag(datetime.now().astimezone())
     recorder = Node(
         package='disc_sim_ros',
         executable='recorder_node',
-        namespace=arguments['namespace'],
-        parameters=[{'bag': arguments['bag']}],
+        namespace=namespace,
+        parameters=[{'bag': bag}],
         output='screen',
     )
     wait = float(arguments['throw_after'])
     if wait < 0.0:
         return [recorder]
-    service = f'{absolute(arguments["namespace"])}/sim_node/throw'
-    throw = ExecuteProcess(
-        cmd=['ros2', 'service', 'call', service, 'std_srvs/srv/Trigger'], output='screen'
-    )
-    return [recorder, TimerAction(period=wait, actions=[throw])]
-
-
-def absolute(namespace: str) -> str:
-    """Return a namespace as the start of a full name."""
-    return ''.join(f'/{part}' for part in namespace.split('/') if part)
+    program = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_recorded']
+    options = ['--namespace', namespace, '--bag', bag, '--wait', str(wait)]
+    return [recorder, ExecuteProcess(cmd=[*program, *options], output='screen')]

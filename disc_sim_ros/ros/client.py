@@ -53,18 +53,21 @@ class Watcher:
 
     def __init__(
         self,
-        domain: int,
-        processes: tuple[Process, ...],
+        domain: int | None,
+        processes: tuple[Process, ...] = (),
         signals_held: Callable[[], AbstractContextManager[None]] = nullcontext,
+        namespace: str = '',
     ) -> None:
         """Join a ROS domain.
 
         Args:
-            domain: Number of the domain.
+            domain: Number of the domain; None for that of the environment.
             processes: Processes that must run while this waits.
             signals_held: Makes a context in which no signal raises an exception: inside rclpy
                 the exception would end as one of another type.
+            namespace: Namespace of the simulator and of the recorder.
         """
+        self._namespace = ''.join(f'/{part}' for part in namespace.split('/') if part)
         self._processes = processes
         self._signals_held = signals_held
         self._context = Context()
@@ -73,7 +76,12 @@ class Watcher:
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self._node = Node(_NODE_NAME, context=self._context, start_parameter_services=False)
+        self._node = Node(
+            _NODE_NAME,
+            context=self._context,
+            namespace=self._namespace,
+            start_parameter_services=False,
+        )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._events: list[str] = []
@@ -100,15 +108,28 @@ class Watcher:
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def wait_until_recorded(self, bag: Path) -> None:
-        """Wait until a recorder records every topic of the simulator, and resume it.
+    def wait_until_recorded(self, bag: Path, *, resume: bool = True) -> None:
+        """Wait until a recorder records every topic of the simulator.
 
-        The recorder was started paused, so that the bag does not begin with this wait.
+        Args:
+            bag: The bag that it fills.
+            resume: Resume the recorder then. It was started paused, so that the bag does not
+                begin with this wait.
 
         Raises:
             DiscSimError: It takes too long, or a process ended.
         """
         self._wait(self._is_ready, START, 'the simulator and a recorder of all its topics')
+        if resume:
+            self._resume_recorder()
+        recorded = f'{self._namespace}/{topics.ODOM}'
+        self._wait(lambda: _has(bag, recorded), START, 'the first messages in the bag')
+
+    def pause(self, seconds: float) -> None:
+        """Let wall time pass [s]."""
+        self._spin(seconds)
+
+    def _resume_recorder(self) -> None:
         futures = []
 
         def resumed() -> bool:  # repeated: a service drops its answer to a client not yet matched
@@ -118,7 +139,6 @@ class Watcher:
 
         self._wait(self._resume.service_is_ready, SERVICE, 'the services of the recorder')
         self._wait(resumed, SERVICE, 'an answer of the recorder')
-        self._wait(lambda: _has(bag, f'/{topics.ODOM}'), START, 'the first messages in the bag')
 
     def steer(self, control: Control) -> None:
         """Command coefficients and wait until they act.
@@ -182,10 +202,12 @@ class Watcher:
     def _is_ready(self) -> bool:
         """Return True if the simulator is there and all its topics have a recorder."""
         node = self._node
-        if ('sim_node', '/') not in node.get_node_names_and_namespaces():
+        space = self._namespace or '/'
+        if ('sim_node', space) not in node.get_node_names_and_namespaces():
             return False
-        names = [n for n, _ in node.get_publisher_names_and_types_by_node('sim_node', '/')]
-        if not self._throw.service_is_ready() or f'/{topics.APPLIED_WIND}' not in names:
+        names = [n for n, _ in node.get_publisher_names_and_types_by_node('sim_node', space)]
+        last = f'{self._namespace}/{topics.APPLIED_WIND}'
+        if not self._throw.service_is_ready() or last not in names:
             return False
         return all(
             any(s.node_name != _NODE_NAME for s in node.get_subscriptions_info_by_topic(name))

@@ -16,12 +16,14 @@ import yaml
 pytest.importorskip('rclpy')
 
 from disc_sim_ros import topics
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.ros.launch_arguments import argument_of, refuse_unknown
 from disc_sim_ros.ros.recorder.options import RECORDER_TABLE
 from disc_sim_ros.ros.sim.config import configuration
 from disc_sim_ros.ros.sim.parameters import TABLE
 from package.sources import ON_DEMAND, PACKAGE, ROOT, executables
 
-NAMES = [entry.name for entry in TABLE]
+NAMES = [argument_of(entry.name) for entry in TABLE]
 
 
 class Made:
@@ -84,7 +86,7 @@ def context(module, **given: str) -> SimpleNamespace:
     declared = arguments(module)
     assert given.keys() <= declared.keys()
     defaults = {name: kwargs['default_value'] for name, kwargs in declared.items()}
-    return SimpleNamespace(launch_configurations=defaults | given)
+    return SimpleNamespace(launch_configurations=defaults | given, argv=[])
 
 
 def sim_node(nodes: list) -> dict:
@@ -95,7 +97,7 @@ def test_every_parameter_is_an_argument_with_unit_and_default(load):
     declared = arguments(load('sim.launch.py'))
     assert list(declared) == ['namespace', 'params_file', 'rviz', 'robot_state_publisher', *NAMES]
     for entry in TABLE:
-        text = declared[entry.name]['description']
+        text = declared[argument_of(entry.name)]['description']
         assert entry.unit in text
         default = list(entry.default) if isinstance(entry.default, tuple) else entry.default
         assert text.endswith(f'default {default!r}]')
@@ -128,13 +130,13 @@ def test_an_argument_that_is_not_given_does_not_override_the_file(load):
 def test_arguments_override_the_file(load):
     module = load('sim.launch.py')
     some = {
-        'disc': 'wraith',
+        'sim.disc': 'wraith',
         'launch.speed': '20',
         'launch.pitch': '-3.5',
-        'auto_throw': 'false',
+        'sim.auto_throw': 'false',
         'wind.seed': '7',
         'imu.offset': '[0.0, 0.1, 0.0]',
-        'frame_prefix': 'red/',
+        'sim.frame_prefix': 'red/',
     }
     parameters = sim_node(module.nodes(context(module, **some)))['parameters']
     assert parameters[0].args == ('params_file',)
@@ -164,7 +166,7 @@ def test_every_node_of_the_launch_file_can_be_started(load):
 
 def test_rviz_and_the_publisher_get_existing_files_and_the_time_and_prefix_of_the_simulator(load):
     module = load('sim.launch.py')
-    given = context(module, publish_clock='true', frame_prefix='red/')
+    given = context(module, **{'sim.publish_clock': 'true', 'sim.frame_prefix': 'red/'})
     _, rviz, publisher = (node.kwargs for node in module.nodes(given))
     assert rviz['arguments'] == ['-d', str(ROOT / 'rviz/disc.rviz')]
     assert Path(rviz['arguments'][1]).is_file()
@@ -182,9 +184,12 @@ def test_the_recorder_gets_the_name_of_the_bag(load):
     given = arguments_of_both(load)
     for bag in ('', 'my bag'):
         given.launch_configurations['bag'] = bag
-        recorder, _ = module.record_and_throw(given)
+        recorder, throw = module.record_and_throw(given)
         assert recorder.kwargs['executable'] == 'recorder_node'
-        assert recorder.kwargs['parameters'] == [{'bag': bag}]
+        (parameters,) = recorder.kwargs['parameters']
+        assert parameters['bag'] == bag or (not bag and parameters['bag'].startswith('bags/disc_'))
+        command = throw.kwargs['cmd']
+        assert command[command.index('--bag') + 1] == parameters['bag']
         assert recorder.kwargs['parameters'][0].keys() <= {e.name for e in RECORDER_TABLE}
 
 
@@ -192,7 +197,7 @@ def arguments_of_both(load) -> SimpleNamespace:
     """Return the defaults of both files: that of the recorder includes that of the simulator."""
     both = [context(load(name)) for name in ('sim.launch.py', 'sim_and_recorder.launch.py')]
     merged = both[0].launch_configurations | both[1].launch_configurations
-    return SimpleNamespace(launch_configurations=merged)
+    return SimpleNamespace(launch_configurations=merged, argv=[])
 
 
 def test_the_simulator_of_the_recorder_waits_for_the_throw(load):
@@ -200,34 +205,51 @@ def test_the_simulator_of_the_recorder_waits_for_the_throw(load):
     include = next(made for made in contents(module) if made.kind == 'IncludeLaunchDescription')
     assert Path(include.args[0].args[0]) == ROOT / 'launch/sim.launch.py'
     passed_on = dict(include.kwargs['launch_arguments'])
-    assert passed_on == {'auto_throw': 'false'}
+    assert passed_on == {'sim.auto_throw': 'false'}
     assert passed_on.keys() <= set(NAMES)
 
 
-@pytest.mark.parametrize(
-    ('namespace', 'service'),
-    [
-        ('', '/sim_node/throw'),
-        ('red', '/red/sim_node/throw'),
-        ('/red', '/red/sim_node/throw'),
-        ('a/b/', '/a/b/sim_node/throw'),
-    ],
-)
-def test_the_throw_comes_after_the_recorder_has_started(load, namespace, service):
+def test_the_throw_waits_for_the_recorder(load):
     module = load('sim_and_recorder.launch.py')
     given = arguments_of_both(load)
-    given.launch_configurations['namespace'] = namespace
-    _, later = module.record_and_throw(given)
-    assert later.kwargs['period'] == 3.0
-    (call,) = later.kwargs['actions']
-    assert call.kwargs['cmd'] == ['ros2', 'service', 'call', service, 'std_srvs/srv/Trigger']
-    source = (ROOT / PACKAGE / 'ros/sim/services.py').read_text(encoding='utf-8')
-    assert "create_service(Trigger, '~/throw'" in source
+    given.launch_configurations['namespace'] = 'a/b'
+    _, throw = module.record_and_throw(given)
+    interpreter, option, program, *options = throw.kwargs['cmd']
+    assert (interpreter, option) == (sys.executable, '-m')
+    assert importlib.util.find_spec(program) is not None
+    assert options[:2] == ['--namespace', 'a/b']
     given.launch_configurations['throw_after'] = '-1'
     assert len(module.record_and_throw(given)) == 1
 
 
+@pytest.mark.parametrize('word', ['launch.sped:=20', 'disc:=wraith', 'sim.modell:=exact'])
+def test_misspelt_arguments_are_refused_with_the_nearest_name(word):
+    name = word.partition(':=')[0]
+    with pytest.raises(ConfigError, match=f'{name}: .* did you mean (launch.speed|sim.)'):
+        refuse_unknown(['rviz:=true', word], ['rviz', *NAMES], direct=True)
+
+
+def test_arguments_of_an_including_file_are_its_own():
+    given = ['model:=robot.urdf', 'camera.rate:=30', 'launch.speed:=20', '--debug']
+    refuse_unknown(given, NAMES, direct=False)
+    with pytest.raises(ConfigError, match=r'launch\.sped'):
+        refuse_unknown([*given, 'launch.sped:=20'], NAMES, direct=False)
+    assert not set(NAMES) & {'model', 'disc', 'ground', 'aero'}
+
+
+def test_two_discs_have_scopes_of_their_own(load):
+    module = load('two_discs.launch.py')
+    groups = [made for made in contents(module) if made.kind == 'GroupAction']
+    spaces = [made.kwargs['launch_configurations'] for made in groups]
+    assert [s['namespace'] for s in spaces] == ['red', 'blue']
+    for made, given in zip(groups, spaces, strict=True):
+        assert (made.kwargs['scoped'], made.kwargs['forwarding']) == (True, False)
+        assert given.keys() - {'namespace'} <= set(NAMES)
+        for value in given.values():
+            assert isinstance(value, str) or value.args[0] in arguments(module)
+
+
 def test_the_real_launch_reads_the_files():
     pytest.importorskip('launch_ros', reason='not among the wheels on PyPI')
-    for name in ('sim.launch.py', 'sim_and_recorder.launch.py'):
+    for name in ('sim.launch.py', 'sim_and_recorder.launch.py', 'two_discs.launch.py'):
         assert load_file(name).generate_launch_description().get_launch_arguments()

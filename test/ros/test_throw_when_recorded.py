@@ -1,0 +1,55 @@
+"""The program of the launch file throws when a recorder records all topics, and not before."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from disc_sim_ros.analysis.flights import flights
+from disc_sim_ros.analysis.recording import discs
+from disc_sim_ros.bags.reader import open_bag
+from ros.recorder_process import Recorder
+from ros.sim.sim_messages import wall
+
+pytestmark = pytest.mark.ros
+COMMAND = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_recorded', '--bag']
+
+
+def test_it_throws_when_all_topics_are_recorded(ros, tmp_path):
+    ros.start({'auto_throw': False})
+    events = ros.subscribe(DiagnosticStatus, 'flight_events')
+    bag = tmp_path / 'bag'
+    throw = subprocess.Popen([*COMMAND, bag])
+    try:
+        ros.spin_until(wall(3.0))
+        assert throw.poll() is None  # there is no recorder yet
+        assert not events
+        recorder = Recorder(ros, bag, {})
+        try:
+            ros.spin_until(lambda: throw.poll() is not None, 'the throw')
+            ros.spin_until(lambda: len(events) > 1, 'the landing')
+            assert throw.returncode == 0
+            assert recorder.end() == 0
+        finally:
+            recorder.process.kill()
+    finally:
+        throw.kill()
+        throw.wait()
+    (flight,) = flights(discs(open_bag(bag))[0])
+    assert flight.release is not None
+    assert flight.landing is not None
+    assert flight.starts_late < 0.006
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_quietly_while_it_waits(ros, tmp_path, number):
+    waiting = subprocess.Popen([*COMMAND, tmp_path / 'bag'], stderr=subprocess.PIPE, text=True)
+    ros.spin_until(lambda: 'demo' in ros.node.get_node_names(), 'the program')
+    waiting.send_signal(number)
+    _, error = waiting.communicate(timeout=10.0)
+    assert (waiting.returncode, error) == (0, '')
