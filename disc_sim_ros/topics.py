@@ -27,7 +27,7 @@ AERO_WRENCH = 'aero_wrench'
 PATH = 'path'
 MARKERS = 'markers'  # LATCHED_QOS
 FIELD_MARKERS = 'field_markers'  # LATCHED_QOS
-FLIGHT_EVENTS = 'flight_events'
+FLIGHT_EVENTS = 'flight_events'  # LATCHED_QOS
 CONFIGURATION = 'configuration'  # LATCHED_QOS
 RELEASE = 'release'  # LATCHED_QOS
 APPLIED_MOMENT = 'applied_moment'
@@ -54,6 +54,7 @@ class FlightEvent(StrEnum):
     RESET = 'reset'
     FAILED = 'failed'  # the disc moves faster than the step can follow
     COMMAND_EXPIRED = 'command expired'
+    TIME_JUMPED = 'time jumped'  # simulated time has jumped forward to the wall clock
 
 
 def event_title(node: str, event: str) -> str:

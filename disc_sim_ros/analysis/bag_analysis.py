@@ -146,8 +146,8 @@ def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
         wind=wind,
         release=State(*states[0].tolist()) if again is None else again.config.release,
         landing=landing,
-        stamps=stamps_of(flight.motion),
-        checks=tuple(checks(flight.motion)),
+        stamps=stamps_of(flight.evened),
+        checks=tuple(checks(flight.evened)),
     )
 
 
@@ -175,7 +175,7 @@ def _landing(flight: Flight, exact: Reflight | None) -> Touchdown | None:
         )
     configuration = flight.configuration
     has_ground = configuration is None or configuration.get(Key.GROUND)
-    crossing = ground_crossing(flight.motion) if has_ground else None
+    crossing = ground_crossing(flight.evened) if has_ground else None
     if crossing is None:
         return None
     time, place = crossing

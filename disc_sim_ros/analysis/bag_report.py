@@ -71,6 +71,8 @@ def document(a: Analysis) -> dict[str, Any]:
             'missing': a.stamps.missing,
             'repeated_stamps': a.stamps.repeated,
             'backward_stamps': a.stamps.backwards,
+            'time_jumps': len(flight.jumps),
+            'jumped_s': sum(shift for _, shift in flight.jumps) / NANOSECONDS,
         },
     }
 
@@ -135,7 +137,7 @@ def _heading(a: Analysis) -> float:
 def _change_document(change: Change, flight: Flight) -> dict[str, Any]:
     return {
         'topic': change.topic,
-        't_s': (change.stamp - flight.start) / NANOSECONDS,
+        't_s': flight.time_of(change.stamp),
         'values': list(change.values),
         'frame': change.frame,
     }
@@ -185,6 +187,9 @@ def summary(a: Analysis) -> str:
         f'    range     {d["range_m"]:.2f} m, {sideways(d["drift_m"])}, apex {d["apex_m"]:.2f} m'
     )
     lines.append(f'    messages  {_stamps_text(a.stamps)}')
+    if jumps := a.flight.jumps:
+        jumped = sum(shift for _, shift in jumps) / NANOSECONDS
+        lines.append(f'    time      jumped to the wall clock, {jumped:.3f} s in all')
     return '\n'.join(lines)
 
 
@@ -256,7 +261,7 @@ def _steering_lines(flight: Flight) -> list[str]:
             changes = changes[1:]  # the first is the wind at the throw
         if changes:
             times = 'once' if len(changes) == 1 else f'{len(changes)} times'
-            at = (changes[0].stamp - flight.start) / NANOSECONDS
+            at = flight.time_of(changes[0].stamp)
             lines.append(f'    steered   {what} {times}, first at {at:.3f} s')
     return lines
 

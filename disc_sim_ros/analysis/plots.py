@@ -10,7 +10,6 @@ import numpy as np
 
 from disc_sim_ros import topics
 from disc_sim_ros.analysis.flight_report import columns
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 
 if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly` does without
     from collections.abc import Sequence
@@ -142,7 +141,7 @@ def _steering(axis: 'Axes', analyses: 'Sequence[Analysis]', topic: str) -> None:
     names, label = _INPUT_LABELS[topic]
     steered = [(i, a, _inputs(a, topic)) for i, a in enumerate(analyses) if _inputs(a, topic)]
     for i, a, changes in steered:
-        times = [(c.stamp - a.flight.start) / NANOSECONDS for c in changes]
+        times = [a.flight.time_of(c.stamp) for c in changes]
         values = np.array([c.values for c in changes])
         end = float(a.trajectory.t[-1])
         rows = np.vstack([np.zeros(3), values, values[-1]])
@@ -161,9 +160,12 @@ def _steering(axis: 'Axes', analyses: 'Sequence[Analysis]', topic: str) -> None:
 
 def _inputs(a: 'Analysis', topic: str) -> 'list[Change]':
     """Return the changes of a topic during a flight, up to its landing."""
-    start = a.flight.start
-    end = start + round(float(a.trajectory.t[-1]) * NANOSECONDS)
-    return [c for c in a.flight.disc.changes if c.topic == topic and start <= c.stamp <= end]
+    start, end = a.flight.start, float(a.trajectory.t[-1])
+    return [
+        c
+        for c in a.flight.disc.changes
+        if c.topic == topic and start <= c.stamp and a.flight.time_of(c.stamp) <= end
+    ]
 
 
 def image(figure: Figure, kind: str) -> bytes:

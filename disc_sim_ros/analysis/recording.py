@@ -1,7 +1,7 @@
 """What a bag holds of discs: their motion, throws, events, commands and wind."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from disc_sim_ros import topics
 from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, Motion, motions
-from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.bags.reader import Bag, Message
 from disc_sim_ros.errors import BagError
 from disc_sim_ros.physics.flight_config import (
@@ -79,7 +79,7 @@ class Disc:
     Attributes:
         motion: All its messages.
         releases: Its throws, in order.
-        events: Its events.
+        events: Its events, each once: a latched one may be recorded again.
         changes: What was applied, in order of arrival.
         topics: Names of the topics beside its motion that the bag holds, without namespace.
         profile_changes: Log times of changes of the wind's profile [ns].
@@ -91,6 +91,14 @@ class Disc:
     changes: tuple[Change, ...] = ()
     topics: frozenset[str] = frozenset()
     profile_changes: tuple[int, ...] = ()
+
+    @cached_property
+    def jumps(self) -> tuple[tuple[int, int], ...]:
+        """Return the jumps of its time: the stamp after each [ns], and by how much [ns]."""
+        jumps = (e for e in self.events if e.name == FlightEvent.TIME_JUMPED)
+        return tuple(
+            (e.stamp, nanoseconds_of(e.values.get(EventKey.JUMP, '')) or 0) for e in jumps
+        )
 
     @property
     def namespace(self) -> str:
@@ -145,15 +153,38 @@ class Flight:
         end = int(self.motion.stamps[-1])
         return [c for c in self.disc.changes if self.start <= c.stamp <= end]
 
+    def elapsed(self, stamps: IntArray) -> IntArray:
+        """Return the time of flight at stamps [ns], without the jumps of time since the start."""
+        elapsed = stamps - self.start
+        for after, shift in self.jumps:
+            elapsed = elapsed - shift * (stamps >= after)
+        return elapsed
+
+    @property
+    def jumps(self) -> list[tuple[int, int]]:
+        """Return the jumps of time from the start to the last message, as `Disc.jumps`."""
+        end = int(self.motion.stamps[-1])
+        return [(after, shift) for after, shift in self.disc.jumps if self.start < after <= end]
+
+    @property
+    def evened(self) -> Motion:
+        """Return its messages with stamps as if time had not jumped."""
+        motion = self.motion
+        return replace(motion, stamps=self.start + self.elapsed(motion.stamps))
+
+    def time_of(self, stamp: int) -> float:
+        """Return the time of flight at a stamp [s]."""
+        return float(self.elapsed(np.array([stamp]))[0]) / NANOSECONDS
+
     @property
     def time(self) -> FloatArray:
-        """Return the time of each message since the start [s], shape (n,)."""
-        return (self.motion.stamps - self.start) / NANOSECONDS
+        """Return the time of flight at each message [s], shape (n,)."""
+        return self.elapsed(self.motion.stamps) / NANOSECONDS
 
     @property
     def starts_late(self) -> float:
-        """Return the time from the release to the first message [s]."""
-        return float(self.motion.stamps[0] - self.start) / NANOSECONDS
+        """Return the time of flight at the first message [s]."""
+        return float(self.time[0])
 
 
 @dataclass(frozen=True)
@@ -260,7 +291,7 @@ def _disc(motion: Motion, bodies: Iterable[Motion], messages: _Messages, known: 
     return Disc(
         motion=motion,
         releases=tuple(sorted(releases, key=_stamp)),
-        events=tuple(events),
+        events=tuple({(e.name, e.stamp, *e.values.items()): e for e in events}.values()),
         changes=tuple(sorted(changes, key=_stamp)),
         topics=frozenset(n for n in topics.FLIGHT_TOPICS if f'{space}/{n}' in known),
         profile_changes=tuple(_profile_changes(space, messages)),

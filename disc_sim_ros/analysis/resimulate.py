@@ -85,14 +85,16 @@ def fly_again(flight: Flight) -> Reflight:
     config = from_document(flight.configuration)
     sim = FlightSimulator(config.setup, config.release, ground=config.ground)
     stamps, rate = flight.motion.stamps, config.physics_rate
-    steps = np.rint((stamps - flight.start) * rate / NANOSECONDS).astype(np.int64)
-    off = np.abs(steps * NANOSECONDS / rate - (stamps - flight.start)) > _ROUNDED
+    elapsed = flight.elapsed(stamps)
+    steps = np.rint(elapsed * rate / NANOSECONDS).astype(np.int64)
+    off = np.abs(steps * NANOSECONDS / rate - elapsed) > _ROUNDED
     end = _last_step(flight, config, int(steps[-1]))
-    last = max(int(stamps[-1]), flight.start + math.floor(end * NANOSECONDS / rate))
+    last = max(int(elapsed[-1]), math.floor(end * NANOSECONDS / rate))
+    begins = flight.elapsed(np.array([c.stamp for c in flight.disc.changes], dtype=np.int64))
     waiting = [
-        (round((c.stamp - flight.start) * rate / NANOSECONDS), c, axes)
-        for c in flight.disc.changes
-        if flight.start <= c.stamp < last and (axes := _axes_of(c, flight)) is not None
+        (round(at * rate / NANOSECONDS), c, axes)
+        for c, at in zip(flight.disc.changes, begins.tolist(), strict=True)
+        if flight.start <= c.stamp and at < last and (axes := _axes_of(c, flight)) is not None
     ]
     changes = tuple(c for _, c, _ in waiting)
     states, winds = np.full((len(steps), 14), np.nan), np.full((len(steps), 3), np.nan)
@@ -186,6 +188,8 @@ def _doubts(flight: Flight, again: Reflight) -> list[str]:
     first, last = flight.motion.log[0], flight.motion.log[-1]
     if any(first <= at <= last for at in flight.disc.profile_changes):
         doubts.append('the profile of the wind was changed in flight, and no stamp records when')
+    if topics.FLIGHT_EVENTS not in flight.disc.topics and again.off_grid:
+        doubts.append(f'not recorded: {topics.FLIGHT_EVENTS}, which reports jumps of time')
     unknown = {c.frame for c in flight.disc.changes if _axes_of(c, flight) is None}
     if unknown:
         doubts.append(f'moments in {", ".join(map(repr, sorted(unknown)))}: no frame of the disc')

@@ -166,6 +166,19 @@ def parameter_overrides(node: Node, names: Iterable[str]) -> dict[str, object]:
     return overridden
 
 
+def has_qos_override(node: Node, topic: str) -> bool:
+    """Return True if files, command line or constructor may override the QoS of a topic.
+
+    Args:
+        node: The node.
+        topic: Name of the topic, relative or absolute. Where rclpy does not give the overrides,
+            the answer is True.
+    """
+    overrides = getattr(node, '_parameter_overrides', None)
+    prefix = f'qos_overrides.{node.resolve_topic_name(topic)}.'
+    return overrides is None or any(name.startswith(prefix) for name in overrides)
+
+
 def _take_message_of(subscription: Subscription) -> Callable[..., Taken | None] | None:
     """Return the function that takes a message without the executor; None if there is none."""
     take: Callable[..., Taken | None] | None = getattr(

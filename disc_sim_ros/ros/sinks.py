@@ -12,6 +12,7 @@ from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from disc_sim_ros.ros.cdr_template import CdrTemplate
+from disc_sim_ros.ros.internals import has_qos_override
 
 
 class Sink(Protocol):
@@ -66,7 +67,10 @@ class PublisherSink:
             name,
             qos,
             event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            # Only where they are used: 150 parameters would hide those of the simulator.
+            qos_overriding_options=QoSOverridingOptions.with_default_policies()
+            if has_qos_override(node, name)
+            else None,
         )
         self._pack = template.pack if template is not None else None
         self._publish = self.publisher.publish

@@ -17,6 +17,7 @@ import sys
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 import numpy as np
 from numpy.testing import assert_array_equal
@@ -26,6 +27,7 @@ pytest.importorskip('rclpy')
 
 from rclpy.context import Context
 from rclpy.node import Node
+from std_srvs.srv import SetBool
 
 from disc_sim_ros import topics
 from disc_sim_ros.bags.reader import open_bag
@@ -36,10 +38,12 @@ from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.ros import messages, qos
 from ros.recorder_process import Recorder
+from ros.sim.sim_messages import patience
 
 pytestmark = pytest.mark.ros
 
-HIGH = {'launch.height': 5.0, 'auto_throw': False, 'publish_rate': 200.0}  # a flight of 4.8 s
+# A flight of 4.8 s, in a time of its own.
+HIGH = {'launch.height': 5.0, 'auto_throw': False, 'publish_rate': 200.0, 'start_time': 0.0}
 PERIOD = 5_000_000  # ns
 HOUR = 3600
 SETUP = Setup(disc=disc_file.load_disc('frisbee'))
@@ -225,6 +229,53 @@ def test_stopped_processes_go_on_exactly_and_report_the_slip(start, record, caps
     time.sleep(0.5)
     recorder.process.send_signal(signal.SIGCONT)
     flight.lands_as_computed()
+    assert_complete()
+    assert 'identical to the last bit' in capsys.readouterr().out
+
+
+def test_after_a_pause_and_a_slip_commands_for_now_act_now(ros, start, record, capsys):
+    """Time jumps to the wall clock, is even otherwise, and the recorded flight is verified."""
+    flight = start(start_time=-1.0)
+    applied = ros.subscribe(Vector3Stamped, topics.APPLIED_COEFFICIENTS)
+    steer = ros.publisher(Vector3Stamped, topics.CMD_COEFFICIENTS)
+    ros.call(flight.sim, 'pause', SetBool, data=False)  # also matches the new endpoints
+    _, assert_complete = record(flight)
+    first = len(flight.odom)
+
+    def command(value):
+        """Send a command for now; return by how much later than that it acts [s]."""
+        message = Vector3Stamped()
+        sent = time.time_ns()
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(sent, 10**9)
+        message.vector.y = value
+        steer.publish(message)
+        ros.spin_until(lambda: any(m.vector.y == value for m in applied), 'the command')
+        stamp = next(m.header.stamp for m in applied if m.vector.y == value)
+        return (stamp.sec * 10**9 + stamp.nanosec - sent) / 1e9
+
+    flight.goes_on(0.4)
+    assert command(0.01) < patience(0.1)
+    ros.pause(flight.sim)
+    time.sleep(1.5)
+    ros.resume(flight.sim)
+    assert command(-0.01) < patience(0.1)
+    process = flight.sim.process
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(0.8)
+    process.send_signal(signal.SIGCONT)
+    flight.goes_on(0.2)
+    assert command(0.005) < patience(0.1)
+    flight.event('landed')
+    flight.goes_on(0.1)
+    jumps = [values_of(e) for e in flight.events if e.name.endswith(': time jumped')]
+    told = {int(Decimal(v['stamp_s']) * 10**9): int(Decimal(v['jump_s']) * 10**9) for v in jumps}
+    assert {'pause', 'slip'} <= {values['cause'] for values in jumps}
+    assert 1.5 + 0.8 - 0.1 - 0.05 < sum(told.values()) / 1e9 < patience(2.6)
+    stamps = [ns(message) for message in flight.odom[first:]]
+    for before, after in pairwise(stamps):
+        shift = sum(by for at, by in told.items() if before < at <= after)
+        assert after - before - shift in {PERIOD, 0}
+    assert int(flight.next_diagnostics()[1]['time_jumps']) >= 2
     assert_complete()
     assert 'identical to the last bit' in capsys.readouterr().out
 

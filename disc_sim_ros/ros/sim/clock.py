@@ -29,6 +29,15 @@ class SimClock:
         self._num, self._den = _period(rate)
         self.steps = 0
 
+    def jump(self, shift: int) -> None:
+        """Move the stamps of this step and of all later ones by a time [ns]."""
+        self._start += shift
+
+    @property
+    def period(self) -> int:
+        """Return the time of one step [ns], rounded down."""
+        return self._num // self._den
+
     @property
     def now(self) -> int:
         """Return the present stamp [ns]."""

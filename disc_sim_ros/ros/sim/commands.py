@@ -19,6 +19,7 @@ from disc_sim_ros.ros.internals import PolledSubscription, Taken
 from disc_sim_ros.ros.sim.clock import NANOSECONDS
 
 MOST_WAITING = 1000  # commands stamped in the future, of one topic
+END_OF_TIME = 2_145_916_800  # s; 2038-01-01, shortly before stamps of ROS end
 MOST_PER_POLL = 256  # messages taken from one topic at a time, so that none starves the others
 
 
@@ -53,6 +54,10 @@ class CommandTopic:
         """Count a command as dropped that was accepted before, when it arrived."""
         self.accepted -= 1
         self.drop(reason)
+
+    def ahead(self, now: int) -> list[int]:
+        """Return how far ahead of a stamp commands wait [ns]; for any thread."""
+        return [at - now for at, *_ in tuple(self.waiting) if at > now]
 
 
 class Commands:
@@ -101,8 +106,7 @@ class Commands:
             ConfigError: The message is not allowed, or too many wait already.
         """
         value = topic.convert(message)
-        stamp = message.header.stamp
-        at = max(stamp.sec * NANOSECONDS + stamp.nanosec, now)
+        at = max(checked_stamp(message.header.stamp), now)
         while at == now and topic.waiting and topic.waiting[0][0] <= now:
             heapq.heappop(topic.waiting)  # superseded; a paused clock may collect thousands
         if len(topic.waiting) >= MOST_WAITING:
@@ -110,6 +114,15 @@ class Commands:
             raise ConfigError(topic.name, 'one more', allowed)
         heapq.heappush(topic.waiting, (at, next(self._order), value))
         topic.accepted += 1
+
+    @property
+    def any_waiting(self) -> bool:
+        """Return True if a command waits for its time."""
+        return any(topic.waiting for topic in self.all)
+
+    def furthest(self, now: int) -> tuple[int, str]:
+        """Return how far ahead of a stamp commands wait at most [ns], and the topic; or 0, ''."""
+        return max(((max(t.ahead(now), default=0), t.name) for t in self.all), default=(0, ''))
 
     def next_change(self) -> float:
         """Return the first stamp at which a waiting command, not a throw, acts [ns]; or inf."""
@@ -120,6 +133,20 @@ class Commands:
         """Discard all waiting commands."""
         for topic in self.all:
             topic.waiting.clear()
+
+
+def checked_stamp(stamp: Any) -> int:
+    """Return a stamp [ns].
+
+    Raises:
+        ConfigError: It is no time, or from 2038 on: the sender has mixed up units or bytes.
+    """
+    if stamp.nanosec >= NANOSECONDS:
+        raise ConfigError('header.stamp.nanosec', stamp.nanosec, 'give less than 1000000000')
+    if stamp.sec >= END_OF_TIME:
+        allowed = f'give less than {END_OF_TIME}, the year 2038'
+        raise ConfigError('header.stamp.sec', stamp.sec, allowed)
+    return int(stamp.sec * NANOSECONDS + stamp.nanosec)
 
 
 def pop_due(topic: CommandTopic, now: int) -> Any:

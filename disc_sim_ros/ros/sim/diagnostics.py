@@ -6,6 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from disc_sim_ros.ros.sim.clock import NANOSECONDS
 from disc_sim_ros.ros.sim.loop import SimLoop
+from disc_sim_ros.ros.sim.simulation import FAR
 
 LATE = 0.01  # s; a worse lateness in a period is a warning
 
@@ -41,6 +42,10 @@ class SimDiagnostics:
         if dropped > self._dropped:
             problems.append(f'{dropped - self._dropped} commands dropped')
         self._dropped = dropped
+        now = loop.clock.now
+        lead, name = loop.commands.furthest(now)
+        if lead > FAR and not loop.follows_wall:
+            problems.append(f'{name} waits {lead / NANOSECONDS:.3f} s until its stamp')
         values: dict[str, object] = {
             'paused': loop.paused,
             'real_time_factor': f'{factor:.4f}',
@@ -50,6 +55,8 @@ class SimDiagnostics:
             'missed_deadlines': loop.pacer.missed,
             'slips': loop.pacer.slips,
             'slipped_s': f'{loop.pacer.slipped:.6f}',
+            'time_jumps': loop.counts.jumps,
+            'jumped_s': f'{loop.counts.jumped / NANOSECONDS:.6f}',
             'throws': loop.counts.throws,
             'landings': loop.counts.landings,
             'failed_flights': loop.counts.failures,
@@ -57,7 +64,11 @@ class SimDiagnostics:
             'dropped_commands': dropped,
         }
         for topic in loop.commands.all:
-            values[f'{topic.name} accepted'] = topic.accepted
+            ahead = topic.ahead(now)
+            values[f'{topic.name} accepted'] = topic.accepted - len(ahead)
+            values[f'{topic.name} waiting'] = len(ahead)
+            if ahead:
+                values[f'{topic.name} furthest lead_s'] = f'{max(ahead) / NANOSECONDS:.6f}'
             values[f'{topic.name} dropped'] = topic.dropped
             if topic.dropped:
                 values[f'{topic.name} last reason'] = topic.reason

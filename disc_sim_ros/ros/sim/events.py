@@ -55,7 +55,7 @@ def landed(sim: FlightSimulator, flight: int, released: int) -> Event:
     Args:
         sim: A simulator whose disc has landed.
         flight: Number of the flight.
-        released: Stamp of its release [ns].
+        released: Stamp of its release, later by the jumps of time since [ns].
     """
     landing = landing_of(sim)
     values = {
@@ -65,6 +65,18 @@ def landed(sim: FlightSimulator, flight: int, released: int) -> Event:
     }
     text = f'{landing.range_m:.2f} m in {landing.flight_time_s:.3f} s'
     return Event(FlightEvent.LANDED, text, values)
+
+
+def time_jumped(shift: int, cause: str) -> Event:
+    """Return the event of a jump of simulated time to the wall clock.
+
+    Args:
+        shift: How far time jumped [ns].
+        cause: Why it was behind: 'pause', 'slip' or 'change of real_time_factor'.
+    """
+    text = f'{shift / NANOSECONDS:.3f} s forward to the wall clock after a {cause}'
+    values: dict[str, object] = {EventKey.JUMP: exact_seconds(shift), EventKey.CAUSE: cause}
+    return Event(FlightEvent.TIME_JUMPED, text, values)
 
 
 def failed(error: IntegrationError) -> Event:

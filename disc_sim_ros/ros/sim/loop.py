@@ -42,14 +42,29 @@ class SimLoop(threading.Thread):
         commands: Commands,
         start: int,
         warn: Callable[..., None],
+        *,
+        wall: Callable[[], int] | None = None,
+        inform: Callable[..., None] = lambda *_: None,
     ) -> None:
-        """Prepare the thread; see `Simulation` for the arguments."""
+        """Prepare the thread; see `Simulation` for the other arguments.
+
+        Args:
+            config: The parameters.
+            publishers: The topics to publish.
+            commands: The command topics to poll.
+            start: The first stamp [ns].
+            warn: Logs a line.
+            wall: Returns the wall clock [ns] that stamps follow at a real-time factor of 1; None
+                where they count from a time of their own.
+            inform: Logs a line that reports no problem.
+        """
         super().__init__(name='simulation')
         self.pacer = Pacer(config.setup.step, max(config.real_time_factor, _SLOWEST), 0.0)
         self.paused = False
-        self._simulation = Simulation(config, publishers, commands, start, warn)
+        self._simulation = Simulation(config, publishers, commands, start, warn, inform=inform)
         self._publishers = publishers
         self._warn = warn
+        self._wall = wall
         self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._wake = threading.Event()
         self._ended = threading.Event()
@@ -65,6 +80,11 @@ class SimLoop(threading.Thread):
     def commands(self) -> Commands:
         """Return the command topics."""
         return self._simulation.commands
+
+    @property
+    def config(self) -> SimConfig:
+        """Return the parameters in force."""
+        return self._simulation.config
 
     @property
     def counts(self) -> Counts:
@@ -106,8 +126,10 @@ class SimLoop(threading.Thread):
         return f'paused at {exact_seconds(self.clock.now)} s'
 
     def resume(self) -> str:
-        """Let simulated time go on."""
-        self.paused = False
+        """Let simulated time go on, from the wall clock if it follows that."""
+        if self.paused:
+            self.paused = False
+            self._follow_wall('pause')
         return f'resumed at {exact_seconds(self.clock.now)} s'
 
     def step(self) -> str:
@@ -134,6 +156,8 @@ class SimLoop(threading.Thread):
         now = self._simulation.config
         if now is not before and _pace(now) != _pace(before):
             self._restart_pacer()
+            if now.real_time_factor != before.real_time_factor and not self.paused:
+                self._follow_wall('change of real_time_factor')
 
     # ---- the thread ----
 
@@ -146,7 +170,7 @@ class SimLoop(threading.Thread):
         self._publish_step(serve=True)
         self._restart_pacer()
         while not self._ended.is_set():
-            sim.poll()
+            sim.poll(ask=not self.follows_wall)
             if self.paused or self._idle():
                 self._wake.wait(LONGEST_SLEEP)
                 self._wake.clear()
@@ -187,11 +211,37 @@ class SimLoop(threading.Thread):
         slips = self.pacer.slips
         steps = self.pacer.due(time.monotonic())
         if self.pacer.slips > slips:
+            jumped = self._follow_wall('slip', steps)
             self._warn(
-                'the machine stalled the simulation, which does not make up for it; it is '
-                f'{self.pacer.slipped:.3f} s behind the wall clock in all'
+                'the machine stalled the simulation, which does not make up for it; '
+                + ('stamps jump to the wall clock; ' if jumped else '')
+                + f'{self.pacer.slipped:.3f} s behind the wall clock in all'
             )
         return steps
+
+    @property
+    def follows_wall(self) -> bool:
+        """Return True if simulated time is the wall clock, not a time of its own."""
+        return self._wall is not None and self._simulation.config.real_time_factor == 1.0
+
+    def _follow_wall(self, cause: str, steps: int = 0) -> bool:
+        """Let simulated time jump to the wall clock if it is behind that by a step or more.
+
+        Args:
+            cause: See `Simulation.jump`.
+            steps: Steps that are due and not yet made.
+
+        Returns:
+            True if it jumped. It never jumps back.
+        """
+        if self._wall is None or not self.follows_wall:
+            return False
+        clock = self.clock
+        shift = self._wall() - clock.at(clock.steps + steps)
+        if shift < max(clock.period, 1):
+            return False
+        self._simulation.jump(shift, cause)
+        return True
 
     def _quantum(self, longest: float) -> int:
         """Return how many steps to make between two polls of the command topics."""

@@ -1,6 +1,6 @@
 """`sim_node`: the disc in real time on ROS 2."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import sys
 import time
 from typing import Any
@@ -48,12 +48,21 @@ class SimNode(Node):
         publishers = Publishers(factory, frames, with_clock=config.publish_clock)
         commands = Commands(self, frames)
         self._silent_until: dict[str, float] = {}  # by what a warning is about, steady clock [s]
-        self.loop = SimLoop(config, publishers, commands, first_stamp(config, self), self._warn)
+        self.loop = SimLoop(
+            config,
+            publishers,
+            commands,
+            first_stamp(config, self),
+            self._warn,
+            wall=wall_clock(config, self),
+            inform=self._inform,
+        )
         create_services(self, self.loop)
         parameters.refuse_unused(self)
         self.add_pre_set_parameters_callback(lambda new: parameters.widened(new, TABLE))
         self.add_on_set_parameters_callback(self._on_set)
         self.add_post_set_parameters_callback(self._after_set)
+        self._is_alone = True
         self._diagnostics = SimDiagnostics(self.loop, factory.node_name, frames.disc)
         self._diagnostics_publisher = self.create_publisher(
             DiagnosticArray, topics.DIAGNOSTICS, 10
@@ -63,6 +72,11 @@ class SimNode(Node):
 
     def start(self) -> None:
         """Start the simulation thread."""
+        config = self.loop.config
+        throw = 'throwing' if config.auto_throw else 'waiting for ~/throw or throw'
+        self.get_logger().info(
+            f'ready: {config.setup.disc.name}, {config.physics_rate:g} Hz, {throw}'
+        )
         self.loop.start()
 
     @property
@@ -93,16 +107,37 @@ class SimNode(Node):
         self.loop.submit(lambda: self.loop.configure(config))
 
     def _publish_diagnostics(self) -> None:
+        self._warn_of_namesake()
         message = DiagnosticArray(status=[self._diagnostics.end_period()])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics_publisher.publish(message)
 
+    def _warn_of_namesake(self) -> None:
+        """Warn once if another node has this name: they share services and mix their topics."""
+        own = (self.get_name(), self.get_namespace())
+        if self._is_alone and self.get_node_names_and_namespaces().count(own) > 1:
+            self._is_alone = False
+            name = self.get_fully_qualified_name()
+            self.get_logger().warning(
+                f'another node is named {name}: give each disc a namespace, -r __ns:=/red'
+            )
+
     def _warn(self, text: str, about: str = '') -> None:
         """Log a warning, at most one in WARNING_PERIOD `about` the same thing."""
-        now = time.monotonic()
-        if now >= self._silent_until.get(about, 0.0):
-            self._silent_until[about] = now + WARNING_PERIOD
+        if self._may_say(about):
             self.get_logger().warning(text)
+
+    def _inform(self, text: str, about: str) -> None:
+        """Log what happens, at most once in WARNING_PERIOD `about` the same kind of event."""
+        if self._may_say(about):
+            self.get_logger().info(text)
+
+    def _may_say(self, about: str) -> bool:
+        now = time.monotonic()
+        if now < self._silent_until.get(about, 0.0):
+            return False
+        self._silent_until[about] = now + WARNING_PERIOD
+        return True
 
 
 def first_stamp(config: SimConfig, node: Node) -> int:
@@ -110,6 +145,14 @@ def first_stamp(config: SimConfig, node: Node) -> int:
     if config.start_time >= 0.0:
         return round(config.start_time * NANOSECONDS)
     return 0 if config.publish_clock else int(node.get_clock().now().nanoseconds)
+
+
+def wall_clock(config: SimConfig, node: Node) -> Callable[[], int] | None:
+    """Return a function that reads the wall clock [ns]; None if stamps count from another time."""
+    simulated = node.get_parameter('use_sim_time').value
+    if config.start_time >= 0.0 or config.publish_clock or simulated:
+        return None
+    return time.time_ns
 
 
 def main(args: Sequence[str] | None = None) -> int:

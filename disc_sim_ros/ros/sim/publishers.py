@@ -83,7 +83,7 @@ class Publishers:
         self._path.header.frame_id = map_
         self.markers = factory.sink(MarkerArray, topics.MARKERS, qos.LATCHED_QOS)
         self.field_markers = factory.sink(MarkerArray, topics.FIELD_MARKERS, qos.LATCHED_QOS)
-        self.events = factory.sink(DiagnosticStatus, topics.FLIGHT_EVENTS, qos.STATE_QOS)
+        self.events = factory.sink(DiagnosticStatus, topics.FLIGHT_EVENTS, qos.LATCHED_QOS)
         self.configuration = factory.sink(String, topics.CONFIGURATION, qos.LATCHED_QOS)
         self.release = factory.sink(Odometry, topics.RELEASE, qos.LATCHED_QOS)
         self._release = CdrTemplate(odometry, messages.ODOMETRY_FIELDS)

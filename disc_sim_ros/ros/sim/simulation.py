@@ -25,6 +25,7 @@ from disc_sim_ros.ros.sim.imu import ImuErrors
 from disc_sim_ros.ros.sim.inputs import Inputs
 from disc_sim_ros.ros.sim.publishers import Publishers
 
+FAR = NANOSECONDS  # a command further ahead is probably stamped by another clock
 _AT_ONCE = ('real_time_factor', 'command_timeout', 'throw_period', 'path_rate')
 
 
@@ -36,6 +37,8 @@ class Counts:
     landings: int = 0
     failures: int = 0
     expired: int = 0
+    jumps: int = 0
+    jumped: int = 0  # ns
 
 
 class Simulation:
@@ -58,6 +61,8 @@ class Simulation:
         commands: Commands,
         start: int,
         warn: Callable[..., None],
+        *,
+        inform: Callable[..., None] = lambda *_: None,
     ) -> None:
         """Hold the disc at its launch.
 
@@ -67,6 +72,7 @@ class Simulation:
             commands: The command topics to poll.
             start: The first stamp [ns].
             warn: `warn(text, about)` logs a line, throttled for each `about`.
+            inform: The same for what is no problem: releases and landings.
         """
         self.clock = SimClock(start, config.physics_rate)
         self.commands = commands
@@ -75,11 +81,13 @@ class Simulation:
         self.config = self._next_config = config
         self.inputs = Inputs(commands, publishers, self.clock, config.setup.wind)
         self._warn = warn
+        self._inform = inform
+        self._asked = False  # whether the sender is on use_sim_time
         self._sim: FlightSimulator | None = None
         self._resting = at_rest(config.launch.state())
         self._imu_errors = ImuErrors(config.imu, 0)
         self.flight = 0
-        self._released = start
+        self._released = start  # later by the jumps of time since [ns]
         self._throw_at: float = start if config.auto_throw else math.inf
 
     # ---- state ----
@@ -128,6 +136,23 @@ class Simulation:
         self._fly(n)
         clock.steps += n
         return n
+
+    def jump(self, shift: int, cause: str) -> None:
+        """Move simulated time forward without a step; it is an event, for exact re-flights.
+
+        Stamps of the flight and of its next periodic throw move along. Commands and their
+        expiry are stamped by the wall clock and do not.
+
+        Args:
+            shift: How far [ns].
+            cause: Why time was behind, see `events.time_jumped`.
+        """
+        self.clock.jump(shift)
+        self._released += shift
+        self._throw_at += shift
+        self.counts.jumps += 1
+        self.counts.jumped += shift
+        self._publish_event(events.time_jumped(shift, cause))
 
     def publish_step(self) -> None:
         """Throw if it is time for that, then publish the state: where a message is due."""
@@ -198,7 +223,9 @@ class Simulation:
         self.inputs.publish_wind()
         self.inputs.publish_control()
         source = 'launch' if release is None else topics.THROW
-        self._publish_event(events.thrown(sim.state, self.flight, source))
+        event = events.thrown(sim.state, self.flight, source)
+        self._publish_event(event)
+        self._inform(f'flight {self.flight} thrown: {event.text}', event.name)
 
     def reset(self) -> None:
         """Put the disc at its launch, at rest; discard commands and count flights from 1 again."""
@@ -240,15 +267,29 @@ class Simulation:
         self.counts.landings += 1
         event = events.landed(sim, self.flight, self._released)
         self._publish_event(event)
+        self._inform(f'flight {self.flight} landed: {event.text}', event.name)
         self.publishers.publish_landing(
             sim.release, sim.touch, sim.setup.disc.diameter, event.text
         )
 
     # ---- messages ----
 
-    def poll(self) -> None:
-        """Take the commands that have arrived."""
-        self.commands.poll(self.clock.now, self._warn_of_drop)
+    def poll(self, *, ask: bool = False) -> None:
+        """Take the commands that have arrived.
+
+        Args:
+            ask: Warn once if a command is far ahead: simulated time is not the wall clock.
+        """
+        now = self.clock.now
+        self.commands.poll(now, self._warn_of_drop)
+        if ask and not self._asked and self.commands.any_waiting:
+            lead, name = self.commands.furthest(now)
+            if lead > FAR:
+                self._asked = True
+                self._warn(
+                    f'{name}: a command waits {lead / NANOSECONDS:.3f} s until its stamp; '
+                    'is the sender on use_sim_time?'
+                )
 
     def _warn_of_drop(self, topic: CommandTopic) -> None:
         self._warn(f'{topic.name} dropped: {topic.reason}', topic.name)

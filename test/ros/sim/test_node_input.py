@@ -116,6 +116,9 @@ BAD = {  # for each topic, messages and patterns of the reason why they are drop
         (bad(TORQUE, wrench__force__x=1e-9), 'force.x: 1e-09 .* torques, not forces'),
         (bad(TORQUE, wrench__force__z=math.nan), 'force.z: nan .* torques, not forces'),
         (bad(TORQUE, header__frame_id='base_link'), "frame_id: 'base_link' .* disc_air"),
+        (bad(TORQUE, header__stamp__nanosec=4_000_000_000), 'nanosec: 4000000000 .* 1000000000'),
+        (bad(TORQUE, header__stamp__nanosec=1_000_000_000), 'nanosec: 1000000000 .* 1000000000'),
+        (bad(TORQUE, header__stamp__sec=2_145_916_800), 'sec: 2145916800 .* 2038'),
     ],
     'cmd_coefficients': [
         (bad(VECTOR, vector__x=math.nan), 'vector.x: nan'),
@@ -271,12 +274,17 @@ def test_commands_for_the_future_are_limited_in_number_and_those_for_now_are_not
 
     def taken() -> bool:
         values = diagnostics_of(diagnostics)
-        both = ('cmd_coefficients accepted', 'cmd_coefficients dropped')
-        return sum(int(values.get(name, 0)) for name in both) == sent
+        kinds = ('accepted', 'waiting', 'dropped')
+        return sum(int(values.get(f'cmd_coefficients {kind}', 0)) for kind in kinds) == sent
 
     ros.spin_until(taken, 'all taken')
     values = diagnostics_of(diagnostics)
     assert values['cmd_coefficients dropped'] == str(batch)
+    assert values['cmd_coefficients accepted'] == '0'
+    assert values['cmd_coefficients waiting'] == str(MOST_WAITING)
+    assert 999_900 < float(values['cmd_coefficients furthest lead_s']) < 1_000_000
+    assert 'cmd_coefficients waits 9999' in diagnostics[-1].status[0].message
+    assert sim.stderr.count('is the sender on use_sim_time?') == 1
     assert f'{MOST_WAITING} commands at most' in values['cmd_coefficients last reason']
     assert f'cmd_coefficients dropped: {values["cmd_coefficients last reason"]}' in sim.stderr
     assert (values['cmd_moment accepted'], values['cmd_moment dropped']) == (str(sent), '0')

@@ -105,7 +105,7 @@ def test_a_signal_ends_it_quietly_whatever_it_does(ros):
     signals = {
         '/flying': [signal.SIGINT],
         '/twice': [signal.SIGINT, signal.SIGTERM, signal.SIGINT],
-        '/paused': [signal.SIGTERM],
+        '/paused': [signal.SIGHUP],
         '/called': [signal.SIGTERM],
     }
     begin = time.monotonic()
