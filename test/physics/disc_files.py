@@ -12,13 +12,20 @@ from disc_sim_ros.physics.launch import Launch
 
 DATA = Path(__file__).parents[1] / 'data'
 NAMES = (
+    'aviar',
+    'buzzz',
+    'firebird',
     'flat_plate',
     'frisbee',
     'frisbee_linear',
     'frisbee_low_damping',
     'frisbee_roll_moment',
+    'roadrunner',
+    'roc',
+    'teebird',
     'ultrastar',
     'wraith',
+    'wraith_tunnel',
 )
 COLUMNS = ('CL', 'CD', 'CM')
 

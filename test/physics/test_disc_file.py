@@ -13,6 +13,8 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 from physics.disc_files import COLUMNS, NAMES, assert_same_disc, end_of, published, yaml_of
 
+DAMPINGS = ('C_Lp', 'C_Mq', 'C_Nr')
+
 # --- the discs of the package
 
 
@@ -115,35 +117,6 @@ def test_the_frisbee_table_holds_the_measured_coefficients():
     assert_array_equal(table.coefficients, rows[:, 1:])
 
 
-def test_the_wraith_table_holds_the_measured_coefficients_in_the_measured_range():
-    _, rows = published('wind_tunnel_wraith_kamaruddin2018.csv')
-    table = disc_file.load_disc('wraith').table
-    assert table is not None
-    measured = (table.alpha >= np.radians(-5.0)) & (table.alpha <= np.radians(15.0))
-    assert_allclose(np.degrees(table.alpha[measured]), rows[:, 0], rtol=1e-15, atol=0.0)
-    assert_array_equal(table.coefficients[measured], rows[:, 1:])
-
-
-def test_the_wraith_table_outside_the_measured_range_is_as_its_file_states():
-    """The rows of the Frisbee plus the mismatch at the edge, which falls to 0 at 90 degrees."""
-    _, measured = published('wind_tunnel_wraith_kamaruddin2018.csv')
-    _, frisbee = published('wind_tunnel_crowther_potts.csv')
-    frisbee_row = {row[0]: row[1:] for row in frisbee}
-    expected = []
-    for degrees in [a for a in frisbee_row if abs(a) <= 90 and not -5 <= a <= 15]:
-        edge = measured[0] if degrees < 0 else measured[-1]
-        mismatch = edge[1:] - frisbee_row[edge[0]]
-        fading = (90.0 - abs(degrees)) / (90.0 - abs(edge[0]))
-        expected.append([degrees, *(frisbee_row[degrees] + fading * mismatch)])
-    table = disc_file.load_disc('wraith').table
-    assert table is not None
-    degrees = np.degrees(table.alpha).round(9)
-    filled = (degrees < -5) | (degrees > 15)
-    guessed = np.column_stack([degrees, table.coefficients])[filled]
-    # The file has four decimals; the sum is rounded once.
-    assert_allclose(guessed, expected, rtol=0.0, atol=0.5001e-4)
-
-
 def test_the_spin_roll_moment_is_measured_except_where_its_file_states_otherwise():
     head, rows = published('spin_roll_moment_hummel2003.csv')
     table = disc_file.load_disc('frisbee_roll_moment').spin_roll_moment
@@ -173,9 +146,10 @@ def test_low_damping_changes_only_roll_and_pitch_damping_to_a_tenth():
     assert_same_disc(disc, frisbee, but=('C_Lp', 'C_Mq'))
 
 
-def test_the_ultrastar_has_the_coefficients_of_the_frisbee():
-    own = ('mass', 'diameter', 'area', 'inertia_axial', 'inertia_diametral')
-    assert_same_disc(disc_file.load_disc('ultrastar'), disc_file.load_disc('frisbee'), but=own)
+def test_the_ultrastar_has_the_steady_coefficients_and_the_roll_moment_of_the_frisbee():
+    own = ('mass', 'diameter', 'area', 'inertia_axial', 'inertia_diametral', *DAMPINGS)
+    base = disc_file.load_disc('frisbee_roll_moment')
+    assert_same_disc(disc_file.load_disc('ultrastar'), base, but=own)
 
 
 # --- a user's own files

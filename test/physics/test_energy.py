@@ -101,8 +101,10 @@ def test_damping_outweighs_the_pitching_moment_of_every_disc_except_the_plate(na
     if not DISCS[name].has(aero):
         pytest.skip('no such coefficients')
     share = gain(Setup(disc=DISCS[name], aero=aero))
-    # 13 % for the paper's disc with a tenth of its damping, the highest.
-    assert (share < 0.2) == (name != 'flat_plate')
+    # 1 is the bound of the proof. 13 % is the highest of discs with a Frisbee's table, 62 % of golf
+    # discs: 7 % of its damping, and C_M down to -0.1 where drag is small (wraith, -10 degrees).
+    highest = 0.2 if name.startswith(('frisbee', 'ultrastar')) else 0.7
+    assert (share < highest) == (name != 'flat_plate')
 
 
 DAMPED = setups(axes=('body',), models=('exact', 'constant_spin')).filter(lambda s: gain(s) < 1.0)
