@@ -30,7 +30,7 @@ def named_tests(text: str) -> list[tuple[str, str]]:
 
 NOT_TESTS = {
     'flat_plate', 'frisbee_linear', 'frisbee_low_damping', 'frisbee_roll_moment',
-    'constant_spin',
+    'constant_spin', 'wraith_tunnel',
 }  # fmt: skip
 
 

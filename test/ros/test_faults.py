@@ -268,12 +268,14 @@ def test_after_a_pause_and_a_slip_commands_for_now_act_now(ros, start, record, c
     flight.event('landed')
     flight.goes_on(0.1)
     jumps = [values_of(e) for e in flight.events if e.name.endswith(': time jumped')]
-    told = {int(Decimal(v['stamp_s']) * 10**9): int(Decimal(v['jump_s']) * 10**9) for v in jumps}
+    jump_at = {
+        int(Decimal(v['stamp_s']) * 10**9): int(Decimal(v['jump_s']) * 10**9) for v in jumps
+    }
     assert {'pause', 'slip'} <= {values['cause'] for values in jumps}
-    assert 1.5 + 0.8 - 0.1 - 0.05 < sum(told.values()) / 1e9 < patience(2.6)
+    assert 1.5 + 0.8 - 0.1 - 0.05 < sum(jump_at.values()) / 1e9 < patience(2.6)
     stamps = [ns(message) for message in flight.odom[first:]]
     for before, after in pairwise(stamps):
-        shift = sum(by for at, by in told.items() if before < at <= after)
+        shift = sum(by for at, by in jump_at.items() if before < at <= after)
         assert after - before - shift in {PERIOD, 0}
     assert int(flight.next_diagnostics()[1]['time_jumps']) >= 2
     assert_complete()
