@@ -118,7 +118,7 @@ def add_throw(p: Parser, *, ground: bool = True) -> None:
     group = throw_flags.add_air(p, 'air, control inputs and end of the flight')
     text = (
         'integration step (default: the longest of 20, 10, 5, 2 and 1 ms in which the fastest '
-        'nutation turns by less than 1.3 rad)'
+        'nutation turns by less than 1.3 rad, or 0.5 rad with weak damping)'
     )
     add_quantity(group, '--step', STEP, text=text, default=argparse.SUPPRESS)
     throw_flags.add_duration(group)
