@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable
 import threading
 
+from disc_sim_ros.bags.transforms import tf_message
 from disc_sim_ros.ros.recorder.clock import LogClock
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
 from disc_sim_ros.ros.recorder.writer_thread import LARGEST_BACKLOG, OVERHEAD, WriterThread
@@ -93,6 +94,8 @@ class Delivery:
     def _put(self, recorder: TopicRecorder, data: bytes, log_time: int, sent: int) -> None:
         if not self._thread.put(recorder.topic, data, log_time, sent or log_time):
             recorder.count_dropped()
+        elif recorder.tf_topic is not None and (message := tf_message(data)) is not None:
+            self._thread.put(recorder.tf_topic, message, log_time, sent or log_time)
 
     def _keep_latched(
         self, recorder: TopicRecorder, data: bytes, received: int, sent: int

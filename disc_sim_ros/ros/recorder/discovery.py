@@ -4,11 +4,13 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from disc_sim_ros import topics
+from disc_sim_ros.bags import transforms
 from disc_sim_ros.ros.recorder.delivery import Delivery
 from disc_sim_ros.ros.recorder.options import Selection
 from disc_sim_ros.ros.recorder.qos import adapt_request_to_offers, bag_topic
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
-from disc_sim_ros.ros.recorder.writer_thread import WriterThread
+from disc_sim_ros.ros.recorder.writer_thread import BagTopic, WriterThread
 
 
 class TopicDiscovery:
@@ -35,6 +37,7 @@ class TopicDiscovery:
         self._selection = selection
         self._thread = thread
         self._delivery = delivery
+        self._tf: BagTopic | None = None
         self._graph: list[tuple[str, list[str]]] = []
         self._warned: set[str] = set()
         self._refused: set[str] = set()
@@ -121,7 +124,22 @@ class TopicDiscovery:
         self._thread.add_topic(recorder.topic, description)
         recorder.set_described(len(publishers))
         self.recorders[name] = recorder
+        self._make_tf(recorder)
         return True
+
+    def _make_tf(self, recorder: TopicRecorder) -> None:
+        """Let `/tf` be made from the transforms of a simulator if no tf2_msgs is installed."""
+        is_transform = recorder.name.rpartition('/')[2] == topics.TRANSFORM
+        if not (is_transform and recorder.type_name == transforms.TRANSFORM):
+            return
+        if not transforms.is_needed() or not self._selection.takes(topics.TF):
+            return
+        if self._tf is None:
+            self._tf = BagTopic()
+            self._thread.add_topic(self._tf, transforms.tf_topic())
+        recorder.tf_topic = self._tf
+        made_from = [r.name for r in self.recorders.values() if r.tf_topic is not None]
+        self._thread.call(lambda writer: writer.custom(*transforms.note(made_from)))
 
     def _refuse(self, name: str, why: str) -> None:
         self._refused.add(name)

@@ -33,6 +33,7 @@ class TopicRecorder:
         name: Name of the topic.
         type_name: Such as 'nav_msgs/msg/Odometry'.
         topic: The topic in the bag.
+        tf_topic: `/tf` of the bag, if it is made from this topic.
         publisher_count: Number of matched publishers.
         received: Messages that arrived.
         dropped: Messages that arrived and were not recorded, because too many waited.
@@ -58,6 +59,7 @@ class TopicRecorder:
         self.name = name
         self.type_name = type_name
         self.topic = BagTopic()
+        self.tf_topic: BagTopic | None = None
         self.publisher_count = 0
         self.received = self.dropped = self.lost = self.missing = 0
         self._type = message_type(type_name)

@@ -10,7 +10,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
 from disc_sim_ros import files
-from disc_sim_ros.bags import schemas
+from disc_sim_ros.bags import schemas, transforms
 from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.errors import DiscSimError
@@ -54,6 +54,7 @@ class BagSink:
         self._factory = factory
         self._topic_id = topic_id
         self._pack = template.pack if template is not None else None
+        self.tf_id: int | None = None  # `/tf`, to be made from the messages of this topic
 
     def send(self, seconds: int, nanoseconds: int, *values: float) -> None:
         """Write the filled template."""
@@ -61,9 +62,11 @@ class BagSink:
 
     def publish(self, message: Any) -> None:
         """Write a message, or its serialised bytes, at the present time of the factory."""
-        data = message if isinstance(message, bytes) else serialize_message(message)
+        data: bytes = message if isinstance(message, bytes) else serialize_message(message)
         now = self._factory.now
         self._factory.writer.write(self._topic_id, data, now, now)
+        if self.tf_id is not None and (message := transforms.tf_message(data)) is not None:
+            self._factory.writer.write(self.tf_id, message, now, now)
 
 
 class BagSinkFactory:
@@ -93,7 +96,11 @@ class BagSinkFactory:
             type_hash=schemas.type_hash(type_name) or '',
             qos=(discovered_qos(qos),),
         )
-        return BagSink(self, self.writer.add(topic), template)
+        sink = BagSink(self, self.writer.add(topic), template)
+        if topic.type == transforms.TRANSFORM and transforms.is_needed():
+            sink.tf_id = self.writer.add(transforms.tf_topic())
+            self.writer.custom(*transforms.note([topic.name]))
+        return sink
 
 
 def write_flight(
