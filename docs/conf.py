@@ -1,4 +1,8 @@
-"""Settings of Sphinx for the documentation site: `make docs` builds it in build/docs."""
+"""Settings of Sphinx for the documentation site: `make docs` builds it in build/docs.
+
+Sphinx, because docs.ros.org uses it, it reads Google-style docstrings and Markdown, its releases are
+regular, and the site works without a network.
+"""
 
 from importlib import metadata
 import importlib.util
