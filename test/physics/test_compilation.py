@@ -95,6 +95,27 @@ def test_without_numba_the_same_flights_run_and_a_note_says_what_to_install(comp
     assert_allclose(plain['numbers'], compiled_flights, rtol=1e-9, atol=1e-9)
 
 
+def test_without_numba_a_flight_beyond_finite_numbers_is_an_error_and_no_warning():
+    program = (
+        "import sys; sys.modules['numba'] = None\n"
+        'from dataclasses import replace\n'
+        'from disc_sim_ros.errors import IntegrationError\n'
+        'from disc_sim_ros.physics import disc_file, flight\n'
+        'from disc_sim_ros.physics.launch import Launch\n'
+        "disc = replace(disc_file.load_disc('frisbee'), mass=1e-300, aero='linear')\n"
+        'launch = Launch(speed=200.0, angle_of_attack=90.0)\n'
+        'try:\n'
+        '    flight.fly(launch, flight.Setup(disc=disc), duration=1.0)\n'
+        'except IntegrationError as error:\n'
+        '    print(error)\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-W', 'error', '-c', program],
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    assert 'shorter step' in done.stdout
+
+
 def test_a_numba_that_does_not_fit_is_named_and_not_used(tmp_path):
     """As with a numba of another year beside a newer numpy, whose import fails in many ways."""
     fault = "raise SystemError('initialization of _internal failed without raising an exception')"

@@ -8,9 +8,12 @@ same equations, some hundred times slower.
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 import sys
 from typing import Any, TypeVar
+
+import numpy as np
 
 
 @contextmanager
@@ -65,10 +68,21 @@ def jit(function: F) -> F:
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep its machine code on disk."""
     if not COMPILED:
-        return function
+        return _silent(function)
     compiled = numba.njit(**_OPTIONS)(function)
     code_cache.enable(compiled)
     return _typed(compiled, function)
+
+
+def _silent(function: F) -> F:
+    """Return the plain function, whose overflows give inf without a warning, as compiled ones."""
+
+    @wraps(function)
+    def silent(*arguments: Any) -> Any:
+        with np.errstate(all='ignore'):
+            return function(*arguments)
+
+    return _typed(silent, function)
 
 
 def is_compiled(function: Callable[..., Any]) -> bool:
