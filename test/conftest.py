@@ -5,8 +5,10 @@ import signal
 
 import pytest
 
-# A shell makes its background processes ignore Ctrl-C, and the processes of the tests inherit it.
+# A shell makes its background processes ignore Ctrl-C, and nohup makes them ignore SIGHUP; the
+# processes of the tests inherit it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first imported
 
 IN_REAL_TIME, IN_BACKGROUND = 0, 10  # niceness
