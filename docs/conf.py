@@ -1,7 +1,7 @@
 """Settings of Sphinx for the documentation site: `make docs` builds it in build/docs.
 
-Sphinx, because docs.ros.org uses it, it reads Google-style docstrings and Markdown, its releases are
-regular, and the site works without a network.
+Sphinx, because docs.ros.org uses it, it reads Google-style docstrings and Markdown, its releases
+are regular, and the site works without a network.
 """
 
 from importlib import metadata
