@@ -87,7 +87,9 @@ class Analysis:
 
     @property
     def passed(self) -> bool:
-        """Return True if all that can be verified is as it should be."""
+        """Return True if something can be verified, and all of it is as it should be."""
+        if not self.flight.motion.is_stamped:
+            return False
         if self.verdict is not None:
             return self.verdict.exact
         return all(check.passed for check in self.checks)

@@ -29,6 +29,8 @@ _SETUP = (
 
 # ---- documents for programs ----
 
+UNSTAMPED = 'the header stamps do not advance, the times are log times'
+
 
 def document(a: Analysis) -> dict[str, Any]:
     """Return an analysis as values that JSON knows; keys carry units, positions are in `map`."""
@@ -81,6 +83,8 @@ def verification_document(a: Analysis) -> dict[str, Any]:
     """Return the verification as values that JSON knows."""
     results = {c.name: {'value': c.value, 'passed': c.passed} for c in a.checks}
     verification: dict[str, Any] = {'passed': a.passed, 'checks': results}
+    if not a.flight.motion.is_stamped:
+        return {'passed': False, 'checks': {}, 'not_verified': UNSTAMPED}
     if a.verdict is None:
         return verification | {'not_flown_again': a.why_not}
     return verification | {
@@ -187,6 +191,8 @@ def summary(a: Analysis) -> str:
         f'    range     {d["range_m"]:.2f} m, {sideways(d["drift_m"])}, apex {d["apex_m"]:.2f} m'
     )
     lines.append(f'    messages  {_stamps_text(a.stamps)}')
+    if not a.flight.motion.is_stamped:
+        lines.append(f'    time      {UNSTAMPED}')
     if jumps := a.flight.jumps:
         jumped = sum(shift for _, shift in jumps) / NANOSECONDS
         lines.append(f'    time      jumped to the wall clock, {jumped:.3f} s in all')
@@ -208,6 +214,8 @@ def title(a: Analysis) -> str:
 def verification_text(a: Analysis) -> str:
     """Return the verification in lines to read."""
     v = a.verdict
+    if not a.flight.motion.is_stamped:
+        return f'    verify    nothing is verified: {UNSTAMPED}'
     if v is None:
         lines = [f'    verify    not flown again: {a.why_not}']
         for check in a.checks:

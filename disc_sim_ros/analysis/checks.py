@@ -1,6 +1,6 @@
 """Checks and measures of a motion that need no model of the body."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -140,7 +140,7 @@ def with_twist(motion: Motion) -> Motion:
         angular[:-1] = (rotation[:-1].inv() * rotation[1:]).as_rotvec() / dt
         angular[-1] = angular[-2]
     numbers = np.hstack([motion.numbers, linear, angular])
-    return Motion(motion.topic, motion.frame, motion.child, motion.stamps, motion.log, numbers)
+    return replace(motion, numbers=numbers)
 
 
 def ground_crossing(motion: Motion) -> tuple[float, FloatArray] | None:

@@ -1,7 +1,7 @@
 """Recorded motion as arrays: the numbers of Odometry and PoseStamped bytes, without ROS."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import struct
 
 import numpy as np
@@ -35,10 +35,11 @@ class Motion:
         topic: Its topic.
         frame: The frame of its pose.
         child: The frame of the body; empty for a PoseStamped.
-        stamps: Of the headers [ns], shape (n,).
+        stamps: Of the headers [ns], shape (n,); the log times where `is_stamped` is False.
         log: When they were received [ns], shape (n,).
         numbers: Position x, y, z [m], quaternion x, y, z, w, and of Odometry the velocity [m/s]
             and the rates [rad/s] in `child`; shape (n, 13) or (n, 7).
+        is_stamped: False if the stamps of the headers do not advance, such as all 0.
     """
 
     topic: str
@@ -47,6 +48,7 @@ class Motion:
     stamps: IntArray
     log: IntArray
     numbers: FloatArray
+    is_stamped: bool = True
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -73,13 +75,8 @@ class Motion:
 
     def part(self, rows: slice) -> 'Motion':
         """Return some of the messages."""
-        return Motion(
-            self.topic,
-            self.frame,
-            self.child,
-            self.stamps[rows],
-            self.log[rows],
-            self.numbers[rows],
+        return replace(
+            self, stamps=self.stamps[rows], log=self.log[rows], numbers=self.numbers[rows]
         )
 
 
@@ -152,12 +149,26 @@ def _motion(
     doubles = np.frombuffer(
         b''.join(m.data[start : start + size] for m in group), dtype=f'{layout.order}f8'
     ).reshape(len(group), -1)
-    parts = [doubles[:, :7]]
-    if type_name == ODOMETRY:
-        parts.append(doubles[:, _TWIST_AT:])
+    numbers = doubles[:, :7]
+    if type_name == ODOMETRY and not _lacks_twist(numbers, doubles[:, _TWIST_AT:]):
+        numbers = np.hstack([numbers, doubles[:, _TWIST_AT:]])
+    nanoseconds = stamps['sec'].astype(np.int64) * NANOSECONDS + stamps['nanosec']
+    log = np.array([min(m.log_time, _LATEST) for m in group], dtype=np.int64)
+    is_stamped = not _stands_still(nanoseconds) or _stands_still(log)
     return Motion(
         *key,
-        stamps=stamps['sec'].astype(np.int64) * NANOSECONDS + stamps['nanosec'],
-        log=np.array([min(m.log_time, _LATEST) for m in group], dtype=np.int64),
-        numbers=np.hstack(parts).astype(float),
+        stamps=nanoseconds if is_stamped else log,
+        log=log,
+        numbers=numbers.astype(float),
+        is_stamped=is_stamped,
     )
+
+
+def _lacks_twist(pose: FloatArray, twist: FloatArray) -> bool:
+    """Return True if a body moves and every twist is 0 or not a number: nothing measured it."""
+    return not np.nan_to_num(twist).any() and len(np.unique(pose[:, :3], axis=0)) > 1
+
+
+def _stands_still(times: IntArray) -> bool:
+    """Return True if all of several times are the same."""
+    return len(times) > 1 and bool((times == times[0]).all())

@@ -28,7 +28,8 @@ def parser(prog: str = 'analyse_bag') -> Parser:
         'how complete the recording is. Reads bags of sim_node and any MCAP bag with '
         'nav_msgs/Odometry or geometry_msgs/PoseStamped. Angles are in degrees with the signs of '
         'Crowther & Potts (2007); positions are in map axes: x forward, y left, z up.',
-        epilog='Exit code 0; 1: the bag is damaged; 2: bad input; 3: --verify found a difference.',
+        epilog='Exit code 0; 1: the bag is damaged; 2: bad input; 3: --verify found a difference, '
+        'or nothing to verify.',
     )
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
@@ -101,7 +102,9 @@ def _run(chosen: argparse.Namespace) -> int:
         if plot is not None:
             lines.append(f'wrote {plot}')
         output.show('\n'.join(lines))
-    return DIFFERENT if chosen.verify and not all(a.passed for a in every) else 0
+    if chosen.verify and not every:
+        output.note(chosen.prog, 'note: there is no flight to verify')
+    return DIFFERENT if chosen.verify and not (every and all(a.passed for a in every)) else 0
 
 
 def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':

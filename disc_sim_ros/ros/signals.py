@@ -6,8 +6,8 @@ import signal
 
 
 def on_signal(handler: Callable[..., object]) -> None:
-    """Handle Ctrl-C, SIGTERM and, unless started by nohup, the end of the terminal from now on."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    """Handle SIGINT, SIGQUIT, SIGTERM and, unless started by nohup, the end of the terminal."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP):
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, handler)
 

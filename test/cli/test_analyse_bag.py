@@ -315,6 +315,53 @@ def test_a_bag_of_another_program_is_measured_and_its_kinematics_checked(documen
     }
 
 
+def unstamped(messages):
+    """Return messages as a program sends them that does not fill in the stamp."""
+    for _, message in messages:
+        message.header.stamp.sec = message.header.stamp.nanosec = 0
+    return messages
+
+
+def test_without_stamps_the_log_times_count_and_nothing_is_verified(document, analyse, tmp_path):
+    parabola = Parabola()
+    bag = foreign.write(tmp_path / 'bag', {'/odom': unstamped(parabola.odometry())})
+    code, summary = document(bag)
+    assert code == 0
+    (flight,) = summary['discs'][0]['flights']
+    assert flight['flight_time_s'] == pytest.approx(parabola.time, abs=2e-5)
+    assert flight['launch']['speed_m_s'] == pytest.approx(parabola.speed)
+    code, out, _ = analyse(bag, '--verify')
+    assert code == 3
+    assert 'nothing is verified: the header stamps do not advance' in out
+    _, summary = document(bag, '--verify')
+    verified = summary['discs'][0]['flights'][0]['verification']
+    assert not verified['passed']
+    assert verified['checks'] == {}
+
+
+def test_a_bag_without_a_flight_is_not_verified(analyse, tmp_path):
+    still = [(at, m) for at, m in Parabola().odometry()[:1]] * 3
+    code, out, err = analyse(foreign.write(tmp_path / 'bag', {'/odom': still}), '--verify')
+    assert code == 3
+    assert 'no flight' in out
+    assert 'there is no flight to verify' in err
+
+
+def test_odometry_without_twist_is_a_path(document, tmp_path):
+    """Many programs leave the twist at 0; speed and climb then follow from the positions."""
+    parabola = Parabola()
+    messages = parabola.odometry()
+    for _, message in messages:
+        message.twist.twist.linear = foreign.vector((0.0, 0.0, 0.0))
+        message.twist.twist.angular = foreign.vector((0.0, 0.0, 0.0))
+    code, summary = document(foreign.write(tmp_path / 'bag', {'/odom': messages}))
+    assert code == 0
+    (flight,) = summary['discs'][0]['flights']
+    # Differences of the position at 100 Hz: second order at the ends, exact for a parabola.
+    assert flight['launch']['speed_m_s'] == pytest.approx(parabola.speed, rel=1e-6)
+    assert flight['flight_time_s'] == pytest.approx(parabola.time, abs=2e-5)
+
+
 def test_a_twist_in_the_wrong_frame_is_reported(analyse, tmp_path):
     code, out, _ = analyse(parabola_bag(tmp_path, in_map=True), '--verify')
     assert code == 3

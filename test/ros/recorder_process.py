@@ -16,7 +16,7 @@ from disc_sim_ros.bags.reader import open_bag
 from ros.sim_process import DEADLINE, Harness
 
 RELIABLE = QoSProfile(depth=20_000)
-_MAIN = 'import runpy\nrunpy.run_module("disc_sim_ros.ros.recorder")'
+MAIN = 'import runpy\nrunpy.run_module("disc_sim_ros.ros.recorder")'
 COUNT = struct.Struct('<4xq')  # a serialised std_msgs/Int64
 
 
@@ -35,7 +35,7 @@ class Recorder:
         self.bag = bag
         self._ros = ros
         self._log = bag.with_name(f'{bag.name}.log')
-        program = f'import sys\n{before}\n{_MAIN}'
+        program = f'import sys\n{before}\n{MAIN}'
         command = [sys.executable, '-c', program, '--ros-args']
         for name, value in {'bag': bag, **parameters}.items():
             text = str(value).lower() if isinstance(value, bool) else value

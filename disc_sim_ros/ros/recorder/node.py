@@ -1,6 +1,7 @@
 """`recorder_node`: every topic into a bag, as the bytes that arrived."""
 
 from collections.abc import Callable, Mapping, Sequence
+import itertools
 import sys
 from typing import Any
 
@@ -13,12 +14,12 @@ from std_srvs.srv import Trigger
 from disc_sim_ros import topics
 from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.writer import BagWriter
-from disc_sim_ros.errors import BagError
+from disc_sim_ros.errors import BagError, ConfigError
 from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.recorder import diagnostics
 from disc_sim_ros.ros.recorder.delivery import Delivery
 from disc_sim_ros.ros.recorder.discovery import TopicDiscovery
-from disc_sim_ros.ros.recorder.options import RECORDER_TABLE, recorder_config
+from disc_sim_ros.ros.recorder.options import RECORDER_TABLE, RecorderConfig, recorder_config
 from disc_sim_ros.ros.recorder.polling_thread import PollingThread
 from disc_sim_ros.ros.recorder.writer_thread import WriterThread
 
@@ -51,16 +52,7 @@ class RecorderNode(Node):
             self.create_service(Trigger, f'~/{name}', _trigger(action))
         parameters.refuse_unused(self)
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, 10)
-        self.writer = BagWriter(
-            config.bag,
-            compression=config.compression,
-            flush_period=config.flush_period,
-            max_size=config.max_size,
-            max_duration=config.max_duration,
-            custom_data={'recorder': self.get_fully_qualified_name()},
-            ros_distro=schemas.ros_distro(),
-            repeat_latched=config.repeat_latched,
-        )
+        self.writer = self._new_writer(config)
         self._writer_thread = WriterThread(self.writer, config.flush_period)
         sim_time: bool = self.get_parameter('use_sim_time').value
         self._delivery = Delivery(
@@ -78,6 +70,27 @@ class RecorderNode(Node):
         self.create_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
         state = ', paused: ~/resume begins' if config.start_paused else ''
         self.get_logger().info(f'recording {config.selection} to {self.writer.folder}{state}')
+
+    def _new_writer(self, config: RecorderConfig) -> BagWriter:
+        """Return the writer of a new bag; a default name that is taken gets a number."""
+        folders = (config.bag.with_name(f'{config.bag.name}_{i}') for i in itertools.count(2))
+        folder = config.bag
+        while True:
+            try:
+                return BagWriter(
+                    folder,
+                    compression=config.compression,
+                    flush_period=config.flush_period,
+                    max_size=config.max_size,
+                    max_duration=config.max_duration,
+                    custom_data={'recorder': self.get_fully_qualified_name()},
+                    ros_distro=schemas.ros_distro(),
+                    repeat_latched=config.repeat_latched,
+                )
+            except ConfigError:
+                if not (config.may_rename and folder.exists()):
+                    raise
+                folder = next(folders)
 
     def start(self) -> None:
         """Start the threads that take messages and write them."""

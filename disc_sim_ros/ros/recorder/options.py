@@ -127,6 +127,7 @@ class RecorderConfig:
     """All parameters of recorder_node, see RECORDER_TABLE; sizes in bytes, None for no limit."""
 
     bag: Path
+    may_rename: bool  # the name is the default: another recorder may have taken it
     selection: Selection
     max_size: int | None
     max_duration: float | None
@@ -153,6 +154,7 @@ def recorder_config(values: Mapping[str, object], namespace: str = '/') -> Recor
     names = frozenset(_full_name(name, namespace) for name in v['topics'].split())
     return RecorderConfig(
         bag=Path(v['bag'] or default_bag(datetime.now().astimezone())),
+        may_rename=not v['bag'],
         selection=Selection(names, _pattern('regex', v), _pattern('exclude', v)),
         max_size=v['max_size_mib'] * _MIB or None,
         max_duration=v['max_duration_s'] or None,

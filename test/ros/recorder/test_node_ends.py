@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -15,7 +16,7 @@ from std_msgs.msg import String
 
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
-from ros.recorder_process import Counter, counts
+from ros.recorder_process import MAIN, Counter, counts
 from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros
@@ -57,6 +58,29 @@ def test_files_split_by_duration_hold_everything_after_repeated_signals(ros, rec
     assert 'Traceback' not in recorder.log
     assert counts(recorder.bag, '/count') == list(range(1000))
     assert len(open_bag(recorder.bag).files) >= 4
+
+
+@pytest.mark.parametrize('number', [signal.SIGQUIT, signal.SIGHUP])
+def test_recorders_of_one_second_have_a_bag_each_and_close_it_at_a_signal(ros, tmp_path, number):
+    same = 'import disc_sim_ros.ros.recorder.options as o; o.default_bag = lambda _: "bags/disc"'
+    logs = [tmp_path / 'a.log', tmp_path / 'b.log']
+    processes = []
+    for log in logs:
+        with log.open('wb') as output:
+            processes.append(
+                subprocess.Popen(
+                    [sys.executable, '-c', f'import sys\n{same}\n{MAIN}', '--ros-args'],
+                    cwd=tmp_path, stdout=output, stderr=output,
+                )
+            )  # fmt: skip
+    for log in logs:
+        ros.spin_until(lambda log=log: 'recording all' in log.read_text(), log.name)
+    for process in processes:
+        process.send_signal(number)
+    assert [process.wait(DEADLINE) for process in processes] == [0, 0]
+    bags = sorted(path.name for path in (tmp_path / 'bags').iterdir())
+    assert bags == ['disc', 'disc_2']
+    assert all(open_bag(tmp_path / 'bags' / name).complete for name in bags)
 
 
 def test_bad_parameters_end_it_with_one_line_before_it_makes_a_folder(record, tmp_path):
