@@ -102,7 +102,8 @@ def test_without_numba_a_flight_beyond_finite_numbers_is_an_error_and_no_warning
         'from disc_sim_ros.errors import IntegrationError\n'
         'from disc_sim_ros.physics import disc_file, flight\n'
         'from disc_sim_ros.physics.launch import Launch\n'
-        "disc = replace(disc_file.load_disc('frisbee'), mass=1e-300, aero='linear')\n"
+        "disc = disc_file.load_disc('frisbee')\n"
+        "disc = replace(disc, linear=replace(disc.linear, CD_0=1e300), aero='linear')\n"
         'launch = Launch(speed=200.0, angle_of_attack=90.0)\n'
         'try:\n'
         '    flight.fly(launch, flight.Setup(disc=disc), duration=1.0)\n'

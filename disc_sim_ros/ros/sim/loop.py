@@ -41,7 +41,7 @@ class SimLoop(threading.Thread):
         publishers: Publishers,
         commands: Commands,
         start: int,
-        warn: Callable[..., None],
+        warn: Callable[[str, str], None],
         *,
         wall: Callable[[], int] | None = None,
         inform: Callable[..., None] = lambda *_: None,
@@ -53,7 +53,7 @@ class SimLoop(threading.Thread):
             publishers: The topics to publish.
             commands: The command topics to poll.
             start: The first stamp [ns].
-            warn: Logs a line.
+            warn: `warn(text, about)` logs a line, throttled for each `about`.
             wall: Returns the wall clock [ns] that stamps follow at a real-time factor of 1; None
                 where they count from a time of their own.
             inform: Logs a line that reports no problem.
@@ -164,7 +164,7 @@ class SimLoop(threading.Thread):
     def run(self) -> None:
         """Fly until asked to end."""
         sim = self._simulation
-        configure_thread(sim.config.realtime_priority, self._warn)
+        configure_thread(sim.config.realtime_priority, lambda text: self._warn(text, 'priority'))
         sim.inputs.publish_wind()
         sim.publish_markers()
         self._publish_step(serve=True)
@@ -215,7 +215,8 @@ class SimLoop(threading.Thread):
             self._warn(
                 'the machine stalled the simulation, which does not make up for it; '
                 + ('stamps jump to the wall clock; ' if jumped else '')
-                + f'{self.pacer.slipped:.3f} s behind the wall clock in all'
+                + f'{self.pacer.slipped:.3f} s behind the wall clock in all',
+                'slip',
             )
         return steps
 

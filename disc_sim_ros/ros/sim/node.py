@@ -122,7 +122,7 @@ class SimNode(Node):
                 f'another node is named {name}: give each disc a namespace, -r __ns:=/red'
             )
 
-    def _warn(self, text: str, about: str = '') -> None:
+    def _warn(self, text: str, about: str) -> None:
         """Log a warning, at most one in WARNING_PERIOD `about` the same thing."""
         if self._may_say(about):
             self.get_logger().warning(text)

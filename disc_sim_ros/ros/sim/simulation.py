@@ -60,7 +60,7 @@ class Simulation:
         publishers: Publishers,
         commands: Commands,
         start: int,
-        warn: Callable[..., None],
+        warn: Callable[[str, str], None],
         *,
         inform: Callable[..., None] = lambda *_: None,
     ) -> None:
@@ -175,7 +175,7 @@ class Simulation:
             self.counts.failures += 1
             self._resting = at_rest(sim.state)
             self._sim = None
-            self._warn(f'flight {self.flight} ended: {error}')
+            self._warn(f'flight {self.flight} ended: {error}', topics.FlightEvent.FAILED)
             self._publish_event(events.failed(error))
             return
         if sim.landed and not was_landed:
@@ -288,7 +288,8 @@ class Simulation:
                 self._asked = True
                 self._warn(
                     f'{name}: a command waits {lead / NANOSECONDS:.3f} s until its stamp; '
-                    'is the sender on use_sim_time?'
+                    'is the sender on use_sim_time?',
+                    'lead',
                 )
 
     def _warn_of_drop(self, topic: CommandTopic) -> None:
