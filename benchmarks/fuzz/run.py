@@ -29,12 +29,9 @@ TARGETS = {
 }
 SLOWEST = 20  # s for one input; slower is a hang
 _MEMORY = 2048  # MB
-CORE = Path(__file__).parents[2] / 'disc_sim_ros' / 'core'
-CHECKS = {'catalogue', 'check', 'disc', 'errors', 'launch'}  # of what comes from outside
-# numba compiles much of the rest: instrumented it would be no longer what flies.
-COMPILED = tuple(
-    f'disc_sim_ros.physics.{path.stem}' for path in CORE.glob('*.py') if path.stem not in CHECKS
-)
+KERNELS = Path(__file__).parents[2] / 'disc_sim_ros/physics/kernels'
+# What numba compiles; instrumented it would be no longer what flies.
+COMPILED = tuple(f'disc_sim_ros.physics.kernels.{path.stem}' for path in KERNELS.glob('*.py'))
 INSTRUMENTED = ('disc_sim_ros', 'mcap', 'mcap_ros2')  # and what a target names beside
 MORE_INSTRUMENTED = {'disc_files': ('yaml',)}  # it makes all else ten times slower
 LONGEST = 1 << 20  # bytes of an input
