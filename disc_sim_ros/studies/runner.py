@@ -76,7 +76,14 @@ def sweep(
             if progress is not None:
                 progress(parts.flights_done, study.size)
 
-        _Work(study, parts.missing(), parts.span, keep).fly(executor, threads, ahead)
+        try:
+            _Work(study, parts.missing(), parts.span, keep).fly(executor, threads, ahead)
+        except BaseException:
+            # Ctrl-C can come between the last part on disk and the line that counts it.
+            parts.recount()
+            if progress is not None:
+                progress(parts.flights_done, study.size)
+            raise
         parts.join()
     return path
 

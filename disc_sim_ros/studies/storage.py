@@ -105,6 +105,10 @@ class Parts:
             raise DiscSimError(f'cannot write {self.path(number)} ({reason(error)})') from None
         self.done.add(number)
 
+    def recount(self) -> None:
+        """Count the complete parts on disk again, and remove incomplete ones."""
+        self.done = self._complete_parts()
+
     def join(self) -> None:
         """Join all parts into the output file, and remove them.
 

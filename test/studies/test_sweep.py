@@ -26,7 +26,7 @@ from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.studies import executors, tables
+from disc_sim_ros.studies import executors, storage, tables
 from disc_sim_ros.studies.flying import TURN, good_step
 from disc_sim_ros.studies.runner import InterruptedSweepError, collect, sweep
 from disc_sim_ros.studies.scatter import Normal, Uniform
@@ -230,6 +230,22 @@ def stopped_sweep(path: Path, *, after: int) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         sweep(STUDY, path, batch=50, progress=progress)
+
+
+def test_a_part_whose_count_ctrl_c_prevents_is_counted_all_the_same(tmp_path, monkeypatch):
+    write_whole = storage.write_whole
+
+    def interrupted_after_writing(path: Path, content: bytes) -> None:
+        write_whole(path, content)
+        if path.name.startswith('0000000002'):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(storage, 'write_whole', interrupted_after_writing)
+    counts = []
+    with pytest.raises(KeyboardInterrupt):
+        sweep(STUDY, tmp_path / 'a.parquet', batch=50, progress=lambda *n: counts.append(n[0]))
+    parts = list((tmp_path / 'a.parquet.parts').glob('*.parquet'))
+    assert counts[-1] == 50 * len(parts) >= 150
 
 
 def test_a_resumed_sweep_keeps_its_flights_and_ends_as_an_uninterrupted_one(expected, tmp_path):
