@@ -46,10 +46,16 @@ def test_all_checks_run_and_failures_come_last(tree):
     assert done.stderr.strip() == 'FAILED: ruff'
 
 
+MANY_BAD = """import pytest
+@pytest.mark.parametrize('n', range(10))
+def test_worse(n): assert n < 0
+"""
+
+
 def test_failed_tests_are_listed_last(tree):
     (tree / 'test').mkdir()
     (tree / 'test/test_bad.py').write_text(
-        'def test_good(): pass\ndef test_bad(): assert 1 == 2\n', encoding='utf-8'
+        'def test_good(): pass\ndef test_bad(): assert 1 == 2\n' + MANY_BAD, encoding='utf-8'
     )
     done = run('tools/check', 'tests', 'ruff', cwd=tree)
     assert done.returncode == 1
@@ -57,6 +63,31 @@ def test_failed_tests_are_listed_last(tree):
     first = end.splitlines()[0]
     assert first.startswith('FAILED test/test_bad.py::test_bad')
     assert '::test_good' not in end
+    assert 'once more alone' not in done.stdout, 'so many failures are no accident'
+
+
+ONCE = """from pathlib import Path
+import pytest
+
+@pytest.mark.parametrize('name', ['a b@c'])
+@pytest.mark.xdist_group('real time')
+def test_once(name):
+    before = Path('failed_before')
+    if not before.exists():
+        before.touch()
+        pytest.fail('too late')
+"""
+
+
+def test_a_test_that_fails_beside_others_is_run_again_alone(tree):
+    (tree / 'test').mkdir()
+    (tree / 'test/test_once.py').write_text(ONCE, encoding='utf-8')
+    done = run('tools/check', 'tests', cwd=tree)
+    assert done.returncode == 0, done.stdout
+    first, _, again = done.stdout.partition('== failed beside other tests')
+    assert 'too late' in first
+    assert 'test/test_once.py::test_once[a b@c]' in again.splitlines()
+    assert '1 passed' in again
 
 
 def test_an_unknown_check_is_refused(tree):
