@@ -16,6 +16,10 @@ _CONTROLS_IN_LINES = re.compile('[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066
 class DiscSimError(Exception):
     """Base class of every error that this package raises on purpose."""
 
+    def __init__(self, message: str) -> None:
+        """Keep the message, with control characters escaped: a bag or a file may name things."""
+        super().__init__(printable(message))
+
 
 class ConfigError(DiscSimError, ValueError):
     """A value from a user (a flag, a YAML key, a parameter, an argument) is not allowed.
@@ -55,10 +59,6 @@ class InterruptedSweepError(DiscSimError):
 
 class BagError(DiscSimError):
     """A bag cannot be written, read or repaired; the message says which bag, where and why."""
-
-    def __init__(self, message: str) -> None:
-        """Keep the message, with the control characters of names in a bag escaped."""
-        super().__init__(printable(message))
 
 
 class DamageError(BagError):

@@ -23,7 +23,7 @@ from disc_sim_ros.analysis.recording import Flight
 from disc_sim_ros.analysis.resimulate import Reflight, Verdict, compare, fly_again
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.bags.reader import Bag, open_bag
-from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight_config import Key, landing_from
 from disc_sim_ros.physics.kernels.equations import State
@@ -32,6 +32,9 @@ from disc_sim_ros.topics import Loss
 
 # Those of recorder_node, and words that other recorders may use.
 _LOSSES = re.compile('|'.join([*Loss, 'drop', 'loss', 'gap', 'missed']), re.IGNORECASE)
+
+
+_ATTITUDE_AND_RATES = slice(State._fields.index('e0'), State._fields.index('r') + 1)
 
 
 class WindSource(StrEnum):
@@ -129,6 +132,8 @@ def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
         why_not = str(error)
     exact = again if verdict is not None and verdict.exact else None
     states = frames.states_from_odometry(with_twist(flight.motion).numbers)
+    if not flight.motion.has_attitude:
+        states[:, _ATTITUDE_AND_RATES] = math.nan
     if exact is not None:
         winds = exact.winds
         wind = WindSource.GUSTS if exact.config.setup.wind.turbulence else WindSource.MEAN
@@ -191,7 +196,7 @@ def _landing(flight: Flight, exact: Reflight | None) -> Touchdown | None:
 
 def doubts_of(bag: Bag) -> tuple[str, ...]:
     """Return the reasons why messages may be missing from a bag."""
-    doubts = [f'{key}: {value}' for key, value in losses(bag.custom_data)]
+    doubts = [printable(f'{key}: {value}') for key, value in losses(bag.custom_data)]
     if not bag.complete:
         doubts.append('the bag was not closed or is damaged')
     return tuple(doubts)

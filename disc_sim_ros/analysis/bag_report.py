@@ -11,7 +11,8 @@ from disc_sim_ros import topics
 from disc_sim_ros.analysis.bag_analysis import Analysis
 from disc_sim_ros.analysis.checks import Stamps, turns_with_spin
 from disc_sim_ros.analysis.flight_report import sideways
-from disc_sim_ros.analysis.recording import Change, Flight
+from disc_sim_ros.analysis.recording import Began, Change, Flight
+from disc_sim_ros.errors import printable
 from disc_sim_ros.physics import frames, theory
 from disc_sim_ros.physics.flight_config import NANOSECONDS, Key
 
@@ -50,6 +51,7 @@ def document(a: Analysis) -> dict[str, Any]:
     return {
         'flight': flight.number,
         'start_ns': flight.start,
+        'began': flight.began,
         'starts_late_s': flight.starts_late,
         'ended': flight.ended,
         'setup': None if configuration is None else _setup_document(configuration),
@@ -156,16 +158,15 @@ def summary(a: Analysis) -> str:
     launch, setup = d['launch'], d['setup']
     what = '' if setup is None else f'{_disc_and_model(setup)}, '
     when = datetime.fromtimestamp(a.flight.start / NANOSECONDS, UTC)
-    turns = 'clockwise' if launch['spin_rad_s'] >= 0.0 else 'anticlockwise'
     lines = [
         f'  flight {a.flight.number}: {what}{when:%Y-%m-%d %H:%M:%S} UTC'
         + (f', {d["starts_late_s"]:.3f} s of it before the bag' if d['starts_late_s'] else ''),
-        f'    launch    {launch["speed_m_s"]:.2f} m/s, pitch {_tenths(launch["pitch_deg"])}, '
-        f'roll {_tenths(launch["roll_deg"])}, yaw {_tenths(launch["yaw_deg"])}, '
-        f'angle of attack {_tenths(launch["angle_of_attack_deg"])} degrees, '
-        f'{launch["height_m"]:.2f} m up',
-        f'    spin      {launch["spin_rad_s"]:.2f} rad/s, {turns} from above',
+        f'    {_start_word(a.flight)} {launch["speed_m_s"]:.2f} m/s, '
+        f'{_attitude_text(launch)}, {launch["height_m"]:.2f} m up',
+        f'    spin      {_spin_text(launch["spin_rad_s"])}',
     ]
+    if a.flight.began is Began.IN_FLIGHT:
+        lines.append('    began     in flight: the bag holds neither the throw nor rest before it')
     if setup is None:
         lines.append(
             f'    path      climbs by {_tenths(launch["climb_deg"])} degrees, heads '
@@ -203,11 +204,12 @@ def title(a: Analysis) -> str:
     """Return one line with what flew and how far."""
     d = document(a)
     launch, setup = d['launch'], d['setup']
-    what = a.flight.disc.name if setup is None else _disc_and_model(setup)
+    what = printable(a.flight.disc.name) if setup is None else _disc_and_model(setup)
+    known = not math.isnan(launch['roll_deg'])
+    turning = f', pitch {launch["pitch_deg"]:.3g}°, spin {launch["spin_rad_s"]:.4g} rad/s'
     return (
-        f'{what}: {launch["speed_m_s"]:.4g} m/s, pitch {launch["pitch_deg"]:.3g}°, '
-        f'spin {launch["spin_rad_s"]:.4g} rad/s; {d["range_m"]:.1f} m '
-        f'in {d["flight_time_s"]:.2f} s'
+        f'{what}: {launch["speed_m_s"]:.4g} m/s{turning if known else ""}; '
+        f'{d["range_m"]:.1f} m in {d["flight_time_s"]:.2f} s'
     )
 
 
@@ -237,8 +239,28 @@ def verification_text(a: Analysis) -> str:
     return '\n'.join(lines + [f'      because: {reason}' for reason in reasons])
 
 
+def _start_word(flight: Flight) -> str:
+    return 'at first ' if flight.began is Began.IN_FLIGHT else 'launch   '
+
+
+def _attitude_text(launch: Mapping[str, Any]) -> str:
+    if math.isnan(launch['roll_deg']):
+        return 'attitude unknown (the quaternions are 0)'
+    return (
+        f'pitch {_tenths(launch["pitch_deg"])}, roll {_tenths(launch["roll_deg"])}, '
+        f'yaw {_tenths(launch["yaw_deg"])}, '
+        f'angle of attack {_tenths(launch["angle_of_attack_deg"])} degrees'
+    )
+
+
+def _spin_text(spin: float) -> str:
+    if math.isnan(spin):
+        return 'unknown'
+    return f'{spin:.2f} rad/s, {"clockwise" if spin >= 0.0 else "anticlockwise"} from above'
+
+
 def _disc_and_model(setup: Mapping[str, Any]) -> str:
-    return f'{setup[Key.DISC]}, {setup[Key.MODEL]} model'
+    return printable(f'{setup[Key.DISC]}, {setup[Key.MODEL]} model')
 
 
 def _wind_lines(setup: Mapping[str, Any] | None) -> list[str]:

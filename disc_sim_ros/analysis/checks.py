@@ -7,13 +7,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from disc_sim_ros.analysis.flights import velocities
-from disc_sim_ros.analysis.odometry import Motion
+from disc_sim_ros.analysis.odometry import Motion, usable
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.flight_config import NANOSECONDS
 
 UNIT = 1e-3  # largest deviation of a quaternion from length 1; sim_node takes the same
 FITTING = 0.05  # of the speed; largest difference of velocity and differences of position
-_SHORTEST = 1e-6  # length of a quaternion that has an attitude
+NO_TURN = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,18 @@ def checks(motion: Motion) -> list[Check]:
             f'{stamps.backwards} go back, {stamps.repeated} repeat, {stamps.missing} are missing',
             not (stamps.backwards or stamps.repeated),
         ),
-        Check('quaternion_norm', worst, f'within {worst:.1e} of 1', worst <= UNIT),
+        Check('quaternion_norm', worst, _norm_text(motion, worst), worst <= UNIT),
     ]
     if motion.has_twist and len(motion) > 2:
         results.append(_twist_check(motion))
     return results
+
+
+def _norm_text(motion: Motion, worst: float) -> str:
+    unset = len(motion) - int(usable(motion.quaternion).sum())
+    if unset:
+        return f'{unset} of {len(motion)} messages have no attitude, such as quaternions of 0'
+    return f'within {worst:.1e} of 1'
 
 
 def _twist_check(motion: Motion) -> Check:
@@ -128,8 +135,10 @@ def with_twist(motion: Motion) -> Motion:
     """Return a motion with a twist: the recorded one, or one by differences of the poses.
 
     Rates by differences are those of the frame itself. If the body turns by more than half a turn
-    between messages, they are too small.
+    between messages, they are too small. A message without an attitude gets that of the message
+    before, or of the first that has one; if none has, no turn.
     """
+    motion = _oriented(motion)
     if motion.has_twist:
         return motion
     rotation = _rotation(motion)
@@ -173,8 +182,20 @@ def turns_with_spin(motion: Motion) -> bool:
     return abs(of_frame - rate) < abs(of_frame)
 
 
+def _oriented(motion: Motion) -> Motion:
+    """Return a motion in which every message has an attitude; see `with_twist`."""
+    good = usable(motion.quaternion)
+    if good.all():
+        return motion
+    numbers = motion.numbers.copy()
+    if not good.any():
+        numbers[:, 3:7] = NO_TURN
+    else:
+        before = np.maximum.accumulate(np.where(good, np.arange(len(good)), -1))
+        numbers[:, 3:7] = numbers[np.where(before < 0, np.argmax(good), before), 3:7]
+    return replace(motion, numbers=numbers)
+
+
 def _rotation(motion: Motion) -> Rotation:
-    with np.errstate(over='ignore'):
-        norm = np.linalg.norm(motion.quaternion, axis=1, keepdims=True)
-    usable = (norm > _SHORTEST) & (norm < 1.0 / _SHORTEST)  # a damaged one may have any length
-    return Rotation.from_quat(np.where(usable, motion.quaternion, (0.0, 0.0, 0.0, 1.0)))
+    good = usable(motion.quaternion)[:, None]
+    return Rotation.from_quat(np.where(good, motion.quaternion, NO_TURN))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from disc_sim_ros.analysis.odometry import Motion
-from disc_sim_ros.analysis.recording import END_OF_BAG, THROWN_AGAIN, Disc, Event, Flight
+from disc_sim_ros.analysis.recording import END_OF_BAG, THROWN_AGAIN, Began, Disc, Event, Flight
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.topics import FlightEvent
@@ -54,7 +54,7 @@ def _thrown(disc: Disc) -> Iterator[Flight]:
                 slice(first, last),
                 release,
                 landing,
-                FlightEvent.LANDED if landing else ended,
+                ended=FlightEvent.LANDED if landing else ended,
             )
 
 
@@ -78,8 +78,10 @@ def _moving(disc: Disc) -> Iterator[Flight]:
             if motion.stamps[b - 1] - motion.stamps[a] < SHORTEST * NANOSECONDS:
                 continue
             number += 1
+            began = Began.MOVED if first else Began.IN_FLIGHT
             ended = why if begin + last == end else 'rest'
-            yield Flight(disc, number, int(motion.stamps[a]), slice(a, b), ended=ended)
+            start, rows = int(motion.stamps[a]), slice(a, b)
+            yield Flight(disc, number, start, rows, began=began, ended=ended)
 
 
 def _pieces(motion: Motion) -> Iterator[tuple[int, int, str]]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import struct
 
 import numpy as np
+from numpy.typing import NDArray
 
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.bags.reader import RawMessage
@@ -21,6 +22,7 @@ COMPONENTS = (
 )  # names of the numbers of `frames.odometry`, with units
 _STAMP = slice(4, 12)
 _PREFIX = 12  # bytes of encapsulation and stamp
+SHORTEST_QUATERNION = 1e-6  # length of one that has an attitude; one that was not set has 0
 _LATEST = 2**63 - 1  # ns; a damaged log time may be later
 _STRINGS = {ODOMETRY: 2, POSE: 1}
 _TWIST_AT = 7 + 36  # doubles: pose, its covariance
@@ -73,11 +75,24 @@ class Motion:
         """Attitude x, y, z, w, shape (n, 4)."""
         return self.numbers[:, 3:7]
 
+    @property
+    def has_attitude(self) -> bool:
+        """Return True if an attitude was recorded: quaternions of length 0 are none."""
+        return not len(self) or bool(usable(self.quaternion).any())
+
     def part(self, rows: slice) -> 'Motion':
         """Return some of the messages."""
         return replace(
             self, stamps=self.stamps[rows], log=self.log[rows], numbers=self.numbers[rows]
         )
+
+
+def usable(quaternions: FloatArray) -> NDArray[np.bool_]:
+    """Return which of some quaternions, shape (n, 4), have an attitude; damaged ones have none."""
+    with np.errstate(over='ignore', invalid='ignore'):
+        norm = np.linalg.norm(quaternions, axis=1)
+    of_use: NDArray[np.bool_] = (norm > SHORTEST_QUATERNION) & (norm < 1.0 / SHORTEST_QUATERNION)
+    return of_use
 
 
 def motions(messages: Iterable[RawMessage], type_name: str) -> list[Motion]:
@@ -150,7 +165,9 @@ def _motion(
         b''.join(m.data[start : start + size] for m in group), dtype=f'{layout.order}f8'
     ).reshape(len(group), -1)
     numbers = doubles[:, :7]
-    if type_name == ODOMETRY and not _lacks_twist(numbers, doubles[:, _TWIST_AT:]):
+    # Without attitudes a twist, in the axes of the body, has no direction.
+    oriented = usable(numbers[:, 3:7]).any()
+    if type_name == ODOMETRY and oriented and not _lacks_twist(numbers, doubles[:, _TWIST_AT:]):
         numbers = np.hstack([numbers, doubles[:, _TWIST_AT:]])
     nanoseconds = stamps['sec'].astype(np.int64) * NANOSECONDS + stamps['nanosec']
     log = np.array([min(m.log_time, _LATEST) for m in group], dtype=np.int64)

@@ -10,6 +10,7 @@ import numpy as np
 
 from disc_sim_ros import topics
 from disc_sim_ros.analysis.flight_report import columns
+from disc_sim_ros.errors import printable
 
 if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly` does without
     from collections.abc import Sequence
@@ -69,7 +70,7 @@ def flight_figure(flight: 'Flight') -> Figure:
         axis.grid(alpha=0.3)
     launch = flight.launch
     figure.suptitle(
-        f'{flight.setup.disc.name}, {flight.setup.model} model: {launch.speed:g} m/s, '
+        f'{printable(flight.setup.disc.name)}, {flight.setup.model} model: {launch.speed:g} m/s, '
         f'pitch {launch.pitch:g}°, roll {launch.roll:g}°, spin {launch.spin:g} rad/s; '
         f'{flight.range:.1f} m in {flight.time:.2f} s',
         parse_math=False,  # a file may have dollars in its name
@@ -92,7 +93,7 @@ def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
     histories = [figure.add_subplot(grid[1 + i // 2, i % 2]) for i in range(4)]
     for i, a in enumerate(analyses):
         colour = COLOURS[i % len(COLOURS)]
-        name = f'{a.flight.disc.name}, flight {a.flight.number}'
+        name = text_of(f'{a.flight.disc.name}, flight {a.flight.number}')
         _views(side, top, a, colour, name)
         _histories(histories, a, colour)
     for axis, across in ((side, 'height z, m'), (top, 'left y, m')):
@@ -110,8 +111,13 @@ def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
         _steering(figure.add_subplot(place), analyses, topic)
     for axis in figure.axes:
         axis.grid(alpha=0.3)
-    figure.suptitle(heading, parse_math=False)  # a path may have dollars in it
+    figure.suptitle(printable(heading), parse_math=False)  # a path may have dollars in it
     return figure
+
+
+def text_of(name: str) -> str:
+    """Return a name from a bag for a legend: no control characters, no mathematics."""
+    return printable(name).replace('$', r'\$')
 
 
 def _views(side: 'Axes', top: 'Axes', a: 'Analysis', colour: str, name: str) -> None:

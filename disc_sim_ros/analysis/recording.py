@@ -2,15 +2,18 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from disc_sim_ros import topics
+from disc_sim_ros.analysis.moving_topics import contents, moving_topics
 from disc_sim_ros.analysis.odometry import ODOMETRY, POSE, Motion, motions
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.bags.reader import Bag, Message
+from disc_sim_ros.bags.topic import full_type
 from disc_sim_ros.errors import BagError
 from disc_sim_ros.physics.flight_config import (
     NANOSECONDS,
@@ -24,12 +27,19 @@ from disc_sim_ros.physics.frames import odometry_array
 from disc_sim_ros.topics import FlightEvent, Frames
 
 END_OF_BAG, THROWN_AGAIN = 'end of the bag', 'thrown again'
-_SINGLE_STATES = (topics.RELEASE, topics.THROW)  # of type Odometry, but not a motion
 # The numbers that a release message and a configuration have in common. Not p and q, 10 and 11:
 # the precession model sets these itself.
 _RELEASED = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12]
 _ROUNDING = 1e-12  # a release message is made after the quaternion was brought to unit length
 _TOGETHER = 2 * NANOSECONDS  # of log time: a release and its configuration are sent together
+
+
+class Began(StrEnum):
+    """With what a recorded flight begins."""
+
+    THROWN = 'thrown'  # a throw was recorded
+    MOVED = 'moved'  # the body was at rest before
+    IN_FLIGHT = 'in flight'  # with its first message; when it was thrown is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +135,7 @@ class Flight:
         rows: Its messages in `disc.motion`, up to the next flight.
         release: The throw; None where no such message was recorded.
         landing: The event; None where none was recorded.
+        began: With what it begins, see `Began`.
         ended: What ended it: 'landed', 'thrown again', 'reset', 'failed' or 'end of the bag', and
             in bags of other recorders 'rest', 'gap' or 'jump'.
     """
@@ -135,6 +146,7 @@ class Flight:
     rows: slice
     release: Release | None = None
     landing: Event | None = None
+    began: Began = Began.THROWN
     ended: str = END_OF_BAG
 
     @cached_property
@@ -211,63 +223,30 @@ def discs(bag: Bag, topic: str | None = None) -> list[Disc]:
     """
     if not bag.message_count:
         raise BagError(f'{bag.path}: the bag is empty')
-    moving = _moving_topics(bag, topic)
+    moving = moving_topics(bag, topic)
     bodies: list[Motion] = []
     for kind in (ODOMETRY, POSE):
         names = [name for name, of in moving.items() if of == kind]
         if names:
-            bodies += motions(bag.raw(names), kind)
+            bodies += motions(bag.raw(names, [kind]), kind)
     if not bodies:
-        raise BagError(f'{bag.path}: {", ".join(moving)}: no messages; {_contents(bag)}')
+        raise BagError(f'{bag.path}: {", ".join(moving)}: no messages; {contents(bag)}')
     types = {
         f'{space}/{name}': kind
         for space in {motion.namespace for motion in bodies}
         for name, kind in topics.FLIGHT_TOPICS.items()
     }
     types[topics.NodeTopic.PARAMETER_EVENTS] = topics.MessageType.PARAMETER_EVENT
-    known = {i.topic.name: i for i in bag.topics if types.get(i.topic.name) == i.topic.type}
+    known = {i.name: i for i in bag.topics if types.get(i.name) == full_type(i.type)}
+    filled = [name for name, info in known.items() if info.message_count]
     messages = _Messages()
-    for message in bag.messages([name for name, info in known.items() if info.message_count]):
-        messages.by_topic.setdefault(message.topic, []).append(message)
+    for message in bag.messages(filled, {types[name] for name in filled}):
+        if full_type(message.type) == types[message.topic]:
+            messages.by_topic.setdefault(message.topic, []).append(message)
     try:
         return [_disc(motion, bodies, messages, set(known)) for motion in bodies]
     except (AttributeError, TypeError, ValueError) as error:  # a damaged definition
         raise BagError(f'{bag.path}: a message is not what its topic says ({error})') from None
-
-
-def _moving_topics(bag: Bag, topic: str | None) -> dict[str, str]:
-    """Return the types of the topics to take motion from, by their names."""
-    types = {info.topic.name: info.topic.type for info in bag.topics}
-    if topic is not None:
-        name = topic if topic in types else f'/{topic.strip("/")}'
-        if name not in types:
-            raise BagError(f'{bag.path}: no topic {topic}; {_contents(bag)}')
-        if types[name] not in {ODOMETRY, POSE}:
-            raise BagError(
-                f'{bag.path}: {name} is {types[name]}; motion is read from {ODOMETRY} and {POSE}'
-            )
-        return {name: types[name]}
-    filled = {info.topic.name for info in bag.topics if info.message_count}
-    odometry = [
-        name
-        for name, kind in types.items()
-        if kind == ODOMETRY and name in filled and name.rpartition('/')[2] not in _SINGLE_STATES
-    ]
-    spaces = {name.rpartition('/')[0] for name in odometry}
-    poses = [
-        name
-        for name, kind in types.items()
-        if kind == POSE and name in filled and name.rpartition('/')[0] not in spaces
-    ]
-    if not odometry and not poses:
-        raise BagError(f'{bag.path}: no {ODOMETRY} or {POSE} to analyse; {_contents(bag)}')
-    return {name: types[name] for name in [*odometry, *poses]}
-
-
-def _contents(bag: Bag) -> str:
-    """Return the topics of a bag, for an error."""
-    filled = [info for info in bag.topics if info.message_count]
-    return 'it holds ' + ', '.join(f'{i.topic.name} ({i.topic.type})' for i in filled)
 
 
 def _disc(motion: Motion, bodies: Iterable[Motion], messages: _Messages, known: set[str]) -> Disc:

@@ -10,7 +10,7 @@ import struct
 from typing import Any, BinaryIO, NamedTuple
 
 from mcap.exceptions import McapError
-from mcap.records import Attachment
+from mcap.records import Attachment, Channel
 
 from disc_sim_ros.bags import latched, metadata
 from disc_sim_ros.bags.bag_folder import BagFolder, bag_folder, read_files
@@ -21,7 +21,7 @@ from disc_sim_ros.bags.mcap_reader import indexed
 from disc_sim_ros.bags.mcap_records import ZSTD_MAGIC, decompress_zstd, messages
 from disc_sim_ros.bags.mcap_recovery import scanned
 from disc_sim_ros.bags.metadata import BagMetadata, TopicInfo
-from disc_sim_ros.bags.topic import Qos, Topic, parse_qos
+from disc_sim_ros.bags.topic import Qos, Topic, full_type, parse_qos
 from disc_sim_ros.errors import BagError, DamageError
 from disc_sim_ros.files import reason
 
@@ -56,7 +56,8 @@ class Bag:
         complete: False where something is missing or damaged that `repair_bag` deals with.
         losses: What is damaged or missing.
         custom_data: Free texts of the recorder.
-        topics: Topics with the counts of their messages.
+        topics: Topics with the counts of their messages; a topic whose type changed stands once
+            for each type.
         message_count: Messages of all topics; latched messages that a file repeats count once.
         start, end: Least and greatest log time [ns]; 0 in a bag without messages.
     """
@@ -76,6 +77,7 @@ class Bag:
         self._all_contents = tuple(contents)  # unpacked files live as long as these
         self.contents = tuple(c if n == 0 else _without_repeats(c) for n, c in enumerate(contents))
         self.custom_data = dict(about.custom_data)
+        self._listed_types = {info.name: info.type for info in about.topics}
         self.topics = _topics(self.contents, about)
         self.message_count = sum(t.message_count for t in self.topics)
         filled_files = [c for c in self.contents if c.chunks]
@@ -100,28 +102,38 @@ class Bag:
                             raise _damage(contents.path, offset, error) from None
         return tuple(attachments)
 
-    def raw(self, names: Iterable[str] | None = None) -> Iterator[RawMessage]:
-        """Yield the messages of all or of the named topics, in the order of their log times.
+    def raw(
+        self, names: Iterable[str] | None = None, types: Iterable[str] | None = None
+    ) -> Iterator[RawMessage]:
+        """Yield messages in the order of their log times.
+
+        Args:
+            names: Topics; None for all.
+            types: Types such as 'nav_msgs/msg/Odometry', which 'nav_msgs/Odometry' is as well;
+                None for all.
 
         Raises:
             BagError: A part of a file is damaged that was not known to be.
         """
-        for name, number, stored in self._stored(names):
+        for name, number, stored in self._stored(names, types):
             data = self._plain(number, stored)
             yield RawMessage(name, stored.log_time, stored.publish_time, data, stored.sequence)
 
-    def messages(self, names: Iterable[str] | None = None) -> Iterator[Message]:
+    def messages(
+        self, names: Iterable[str] | None = None, types: Iterable[str] | None = None
+    ) -> Iterator[Message]:
         """Yield decoded messages, by the definitions in the bag, as `raw` does.
 
         Raises:
             BagError: As `raw`, and where a message cannot be decoded.
         """
-        types = {info.name: info.type for info in self.topics}
         decoders: dict[tuple[int, int], tuple[str, Callable[[bytes], Any]]] = {}
-        for name, number, stored in self._stored(names):
+        for name, number, stored in self._stored(names, types):
             key = number, stored.channel_id
             if key not in decoders:
-                decoders[key] = _decoder(self.contents[number], stored.channel_id, types[name])
+                decoders[key] = _decoder(
+                    self.contents[number], stored.channel_id, self._listed_types.get(name, '')
+                )
             type_name, decode = decoders[key]
             try:
                 value = decode(self._plain(number, stored))
@@ -147,12 +159,15 @@ class Bag:
                 f'{contents.path}: the message at {stored.log_time} ns is damaged ({error})'
             ) from None
 
-    def _stored(self, names: Iterable[str] | None) -> Iterator[tuple[str, int, Any]]:
+    def _stored(
+        self, names: Iterable[str] | None, types: Iterable[str] | None
+    ) -> Iterator[tuple[str, int, Any]]:
         """Yield name, number of the file and stored message, in the order of the log times."""
         if isinstance(names, str):
             names = (names,)
         wanted = None if names is None else frozenset(names)
-        channels = [_names(c, wanted) for c in self.contents]
+        kinds = None if types is None else frozenset(full_type(name) for name in types)
+        channels = [self._names(c, wanted, kinds) for c in self.contents]
         ids = [frozenset(c) for c in channels]
         chunks = sorted(
             (
@@ -180,6 +195,21 @@ class Bag:
                 waiting.sort(key=_LOG_TIME)
             for _, n, stored in waiting:
                 yield channels[n][stored.channel_id], n, stored
+
+    def _names(
+        self, contents: Contents, wanted: frozenset[str] | None, kinds: frozenset[str] | None
+    ) -> dict[int, str]:
+        """Return the topics of the channels of a file that are wanted, by their ids."""
+        return {
+            i: channel.topic
+            for i, channel in contents.channels.items()
+            if (wanted is None or channel.topic in wanted)
+            and (kinds is None or full_type(self._type_of(contents, channel)) in kinds)
+        }
+
+    def _type_of(self, contents: Contents, channel: Channel) -> str:
+        schema = contents.schemas.get(channel.schema_id)
+        return (schema.name if schema else '') or self._listed_types.get(channel.topic, '')
 
 
 _LOG_TIME = itemgetter(0)
@@ -263,14 +293,6 @@ def _opened(contents: Contents) -> BinaryIO:
         raise BagError(f'{contents.path}: cannot be read ({reason(error)})') from None
 
 
-def _names(contents: Contents, wanted: frozenset[str] | None) -> dict[int, str]:
-    return {
-        i: channel.topic
-        for i, channel in contents.channels.items()
-        if wanted is None or channel.topic in wanted
-    }
-
-
 def _messages(path: Path, file: BinaryIO, chunk: Chunk, ids: frozenset[int]) -> list[Any]:
     try:
         data = chunk_bytes(file, chunk)
@@ -288,22 +310,26 @@ def _damage(path: Path, offset: int, error: DamageError) -> BagError:
 
 
 def _topics(contents: Iterable[Contents], about: BagMetadata) -> tuple[TopicInfo, ...]:
-    counts: dict[str, int] = {}
-    topics: dict[str, Topic] = {}
+    listed = {info.name: info for info in about.topics}
+    counts: dict[tuple[str, str], int] = {}
+    topics: dict[tuple[str, str], Topic] = {}  # by name and type
     for c in contents:
         for channel_id, channel in c.channels.items():
             topic = topic_of(channel, c.schemas.get(channel.schema_id))
-            topics.setdefault(channel.topic, topic)
-            counts[channel.topic] = counts.get(channel.topic, 0) + c.counts.get(channel_id, 0)
+            if not topic.type and topic.name in listed:
+                topic = replace(topic, type=listed[topic.name].type)
+            key = topic.name, topic.type
+            topics.setdefault(key, topic)
+            counts[key] = counts.get(key, 0) + c.counts.get(channel_id, 0)
     for info in about.topics:
-        before = topics.setdefault(info.name, info.topic)
-        if not before.type:
-            topics[info.name] = before = replace(before, type=info.type)
+        keys = [key for key in topics if key[0] == info.name]
+        key = (info.name, info.type) if len(keys) != 1 else keys[0]
+        before = topics.setdefault(key, info.topic)
         late = about.custom_data.get(metadata.LATE_QOS + info.name)
         offered = info.topic.qos if late is None else _profiles(late)
         if offered and before.qos != offered:  # of publishers that came later
-            topics[info.name] = replace(before, qos=offered)
-    return tuple(TopicInfo(topic=t, message_count=counts.get(n, 0)) for n, t in topics.items())
+            topics[key] = replace(before, qos=offered)
+    return tuple(TopicInfo(topic=t, message_count=counts.get(k, 0)) for k, t in topics.items())
 
 
 def _profiles(text: str) -> tuple[Qos, ...]:

@@ -85,6 +85,15 @@ class Topic:
         return any(profile.durability == 'transient_local' for profile in self.qos)
 
 
+def full_type(name: str) -> str:
+    """Return a type with its middle part, 'nav_msgs/msg/Odometry' for 'nav_msgs/Odometry'.
+
+    Some recorders write the short name, which ROS 1 had.
+    """
+    package, _, rest = name.partition('/')
+    return f'{package}/msg/{rest}' if rest and '/' not in rest else name
+
+
 def qos_yaml(profiles: Iterable[Qos]) -> str:
     """Return profiles as the YAML list that rosbag2 Jazzy keeps; `[]` for none."""
     return '\n'.join('\n'.join(_item(profile)) for profile in profiles) or '[]'

@@ -1,6 +1,7 @@
 """`analyse_bag`: summarises, verifies and plots the flights in an MCAP bag, without ROS."""
 
 import argparse
+from collections import Counter
 from collections.abc import Sequence
 import json
 import math
@@ -12,7 +13,7 @@ from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser
 from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
-from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
+from disc_sim_ros.errors import BagError, ConfigError, DiscSimError, printable
 
 if TYPE_CHECKING:
     from disc_sim_ros.analysis.bag_analysis import Analysis
@@ -186,19 +187,25 @@ def _bag_lines(bag: 'Bag') -> list[str]:
         f'{bag.path}: {seconds:.2f} s, {bag.message_count} messages of {len(filled)} topics, '
         f'{size / 1e6:.1f} MB'
     ]
-    counts = [f'{info.topic.name} {info.message_count}' for info in filled]
+    repeated = {name for name, n in Counter(info.name for info in filled).items() if n > 1}
+    counts = [
+        printable(
+            f'{info.name}{f" ({info.type})" if info.name in repeated else ""} {info.message_count}'
+        )
+        for info in filled
+    ]
     while counts:
         line = '  ' + counts.pop(0)
         while counts and len(line) + len(counts[0]) < 97:
             line += ', ' + counts.pop(0)
         lines.append(line)
-    return lines + [f'  {key}: {value}' for key, value in losses(bag.custom_data)]
+    return lines + [printable(f'  {key}: {value}') for key, value in losses(bag.custom_data)]
 
 
 def _disc_lines(disc: 'Disc', analyses: 'Sequence[Analysis]', *, verify: bool) -> list[str]:
     from disc_sim_ros.analysis import bag_report  # noqa: PLC0415
 
-    lines = [f'{disc.name}: {disc.motion.topic}, {len(disc.motion)} messages']
+    lines = [printable(f'{disc.name}: {disc.motion.topic}, {len(disc.motion)} messages')]
     if not analyses:
         lines.append('  no flight: no throw was recorded, and the disc does not move')
     for a in analyses:

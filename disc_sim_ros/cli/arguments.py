@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import re
 from typing import Any, NoReturn
 
-from disc_sim_ros.errors import ConfigError, brief
+from disc_sim_ros.errors import ConfigError, brief, printable
 from disc_sim_ros.validation import Quantity
 
 # argparse takes only -1 and -1.5 for numbers, and would read -1e-3 or -inf as a flag.
@@ -24,7 +24,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with code 2 and one line on stderr."""
-        text = ' '.join(message.removeprefix('argument ').split())
+        text = printable(' '.join(message.removeprefix('argument ').split()))
         self.exit(2, f'{self.prog}: error: {text}\n')
 
     def in_flags(self, error: ConfigError) -> ConfigError:
