@@ -73,6 +73,7 @@ class Loss(StrEnum):
     DROPPED = 'dropped'
     LOST = 'lost'
     GAPS = 'gaps'
+    NOT_RECORDED = 'not recorded'
 
 
 class NodeTopic:

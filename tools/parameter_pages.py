@@ -52,17 +52,19 @@ Foxglove and `analyse_bag` ([bags.md](bags.md) describes the contents):
     ros2 run disc_sim_ros recorder_node --ros-args -p bag:=my_flight
     ros2 run disc_sim_ros recorder_node --ros-args -p exclude:='/rosout|/parameter_events'
 
-Ctrl-C or SIGTERM ends it: it writes the messages that have arrived, then the index, and prints a
-summary of the bag. If it is killed or the power fails, at most the messages since the last flush
-(`flush_period`) are lost, and `repair_bag` makes a complete copy of the bag. If the disk is full
-or the folder is removed, it ends with exit code 1 and leaves a readable bag. If the bag exists, it
-ends with exit code 2 and changes nothing.
+Ctrl-C, SIGTERM, SIGHUP (the terminal is closed) or SIGQUIT ends it: it writes the messages that
+have arrived, then the index, and prints a summary of the bag. If it is killed or the power fails,
+at most the messages since the last flush (`flush_period`) are lost, and `repair_bag` makes a
+complete copy of the bag. If the disk is full or the folder is removed, it ends with code 1 and
+leaves a readable bag. If the bag that `bag` names exists, it ends with exit code 2 and changes
+nothing; a default name that is taken gets a number, such as `_2`.
 
 - **Discovery.** A topic is subscribed within 0.05 s after the graph reports it, whether its
   publisher started before or after the recorder. A hidden topic (a part of its name begins with
   `_`) is recorded if `topics` names it; a topic that only the recorder publishes is recorded if
-  `topics` or `regex` selects it. A type that is not installed, or a second type on a topic, causes
-  one warning; the other topics are recorded.
+  `topics` or `regex` selects it. A type that is not installed causes
+  one warning, and the bag and the last line name it; the other topics are recorded. If another
+  type appears on a topic, it is recorded as a channel of its own, and one warning says so.
 - **Quality of service.** The subscription requests what all publishers of a topic offer, with a
   depth of 5000 messages: half a second at 10 kHz. If a publisher with a weaker offer appears, a
   second subscription takes over; no message is lost or recorded twice.

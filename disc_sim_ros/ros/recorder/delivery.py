@@ -42,7 +42,7 @@ class Delivery:
         self._simulated_time = simulated_time
         self._waiting: list[_Message] = []  # for the first `/clock`
         self._waiting_bytes = 0
-        self._latched: dict[str, deque[_Message]] = {}  # by topic, while paused
+        self._latched: dict[str, deque[_Message]] = {}  # by label, while paused
 
     @property
     def waiting(self) -> int:
@@ -101,10 +101,10 @@ class Delivery:
         self, recorder: TopicRecorder, data: bytes, received: int, sent: int
     ) -> None:
         """Keep as many messages of a latched topic as it has publishers, the last ones."""
-        messages = self._latched.get(recorder.name, ())
+        messages = self._latched.get(recorder.label, ())
         most = max(recorder.publisher_count, 1)
         message = (recorder, data, received, sent)
-        self._latched[recorder.name] = deque([*messages, message], maxlen=most)
+        self._latched[recorder.label] = deque([*messages, message], maxlen=most)
 
     def _wait(self, recorder: TopicRecorder, data: bytes, received: int, sent: int) -> None:
         if self._waiting_bytes > LARGEST_BACKLOG:

@@ -36,7 +36,7 @@ class Progress:
 def losses(recorders: Iterable[TopicRecorder]) -> dict[str, int]:
     """Return the numbers of lost messages by the kind of loss and the topic, if not 0."""
     return {
-        f'{kind} {recorder.name}': count
+        f'{kind} {recorder.label}': count
         for recorder in recorders
         for kind, count in (
             (Loss.DROPPED, recorder.dropped),
@@ -79,10 +79,19 @@ def diagnostic(name: str, writer: BagWriter, progress: Progress) -> DiagnosticSt
     )
 
 
-def summary(writer: BagWriter, losses: Mapping[str, int]) -> str:
-    """Return the last line of a recorder: what its closed bag holds, and how to open it."""
+def summary(
+    writer: BagWriter, losses: Mapping[str, int], not_recorded: Mapping[tuple[str, str], str]
+) -> str:
+    """Return the last line of a recorder: what its closed bag holds, and how to open it.
+
+    Args:
+        writer: The closed bag.
+        losses: Numbers of lost messages, of `losses`.
+        not_recorded: Why the types of topics are missing, by name and type.
+    """
     filled = sum(count > 0 for count in writer.counts.values())
-    lost = ', '.join(f'{loss}: {count}' for loss, count in losses.items())
+    missing = [f'{Loss.NOT_RECORDED} {name} ({kind})' for name, kind in not_recorded]
+    lost = ', '.join([*(f'{loss}: {count}' for loss, count in losses.items()), *missing])
     return (
         f'recorded {_plural(writer.message_count, "message")} of {_plural(filled, "topic")}, '
         f'{writer.bytes / 1e6:.1f} MB, {lost or "nothing lost"}, in {writer.folder} '

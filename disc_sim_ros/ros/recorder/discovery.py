@@ -7,6 +7,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from disc_sim_ros import topics
 from disc_sim_ros.bags import transforms
 from disc_sim_ros.ros.recorder.delivery import Delivery
+from disc_sim_ros.ros.recorder.extra_nodes import ExtraNodes
 from disc_sim_ros.ros.recorder.options import Selection
 from disc_sim_ros.ros.recorder.qos import adapt_request_to_offers, bag_topic
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
@@ -17,7 +18,8 @@ class TopicDiscovery:
     """Records the selected topics of the graph.
 
     Attributes:
-        recorders: The recorded topics by name; only `update` changes it.
+        recorders: The recorded topics by name and type; only `update` changes it.
+        refused: Why a type of a topic is not recorded.
     """
 
     def __init__(
@@ -31,8 +33,9 @@ class TopicDiscovery:
             thread: The thread that writes the bag.
             delivery: What becomes of the messages; its lock is held meanwhile.
         """
-        self.recorders: dict[str, TopicRecorder] = {}
+        self.recorders: dict[tuple[str, str], TopicRecorder] = {}
         self._node = node
+        self._extra_nodes = ExtraNodes(node)
         self._log = node.get_logger()
         self._selection = selection
         self._thread = thread
@@ -40,7 +43,7 @@ class TopicDiscovery:
         self._tf: BagTopic | None = None
         self._graph: list[tuple[str, list[str]]] = []
         self._warned: set[str] = set()
-        self._refused: set[str] = set()
+        self.refused: dict[tuple[str, str], str] = {}
 
     def update(self) -> None:
         """Subscribe to topics that are new, and follow changes of the others."""
@@ -76,6 +79,7 @@ class TopicDiscovery:
         with self._delivery.lock:
             for recorder in self.recorders.values():
                 recorder.close()
+            self._extra_nodes.close()
 
     def warn_once(self, text: str, about: str = '') -> None:
         """Log a warning, once for each `about`."""
@@ -85,47 +89,70 @@ class TopicDiscovery:
 
     def _consider(self, name: str, types: list[str], new: list[str]) -> bool:
         """Record a topic if it is selected; return False to consider it again later."""
-        if name in self.recorders:
-            if len(types) > 1:
-                used = self.recorders[name].type_name
-                text = f'{name} has several types, {", ".join(types)}: recorded is {used}'
-                self.warn_once(text, about=f'types of {name}')
-            return True
-        if name in self._refused or not self._selection.takes(name):
+        known = self.recorders.keys() | self.refused.keys()
+        missing = [kind for kind in types if (name, kind) not in known]
+        if not missing or not self._selection.takes(name):
             return True
         publishers = self._node.get_publishers_info_by_topic(name)
         others = [p for p in publishers if not self._is_own(p)]
         if not others and (self._selection.everything or not publishers):
             return False
-        if self._record(name, (others or publishers)[0].topic_type, publishers):
-            new.append(name)
-        return len(types) == 1  # otherwise consider it again, and warn
+        published = list(dict.fromkeys(p.topic_type for p in others or publishers))
+        new += [
+            self.recorders[name, kind].label
+            for kind in published
+            if kind in missing and self._record(name, kind, publishers)
+        ]
+        return all(kind in published for kind in missing)
 
     def _record(self, name: str, type_name: str, publishers: list[TopicEndpointInfo]) -> bool:
-        """Begin to record a topic; return False if that is impossible."""
+        """Begin to record a type of a topic; return False if that is impossible."""
+        before = [known for known, _ in self.recorders].count(name)
+        publishers = [p for p in publishers if p.topic_type == type_name]
         try:
+            recorder = self._subscribed(before, name, type_name, publishers)
+        except ImportError as error:
+            self._refuse(name, type_name, f'no type {type_name} here ({error})')
+            return False
+        except RuntimeError:  # rclpy's, whose text is about parts of ROS
+            self._refuse(name, type_name, f'ROS refuses to subscribe to it as {type_name}')
+            return False
+        if before:
+            recorder.label, recorder.is_late = f'{name} ({type_name})', True
+            text = f'{name} has another type, {type_name}: it is recorded as a channel of its own'
+            self.warn_once(text, about=recorder.label)
+        description = bag_topic(name, type_name, publishers)
+        if description.definition is None:
+            self.warn_once(f'{name}: no definition of {type_name} here, so that few can read it')
+        self._thread.add_topic(recorder.topic, description)
+        recorder.set_described(self._node.count_publishers(name))
+        self.recorders[name, type_name] = recorder
+        self._make_tf(recorder)
+        return True
+
+    def _subscribed(
+        self, before: int, name: str, type_name: str, publishers: list[TopicEndpointInfo]
+    ) -> TopicRecorder:
+        """Return the recorder of a type of a topic, of which `before` types are recorded.
+
+        Where a publisher of this node has another type, a further node takes the topic.
+        """
+        for number in (before, before + 1):
             recorder = TopicRecorder(
-                self._node,
+                self._extra_nodes.of(number),
                 name,
                 type_name,
                 self._delivery.deliver,
                 clock=self._delivery.clock,
             )
-            self._subscribe(recorder, publishers)
-        except ImportError as error:
-            self._refuse(name, f'no type {type_name} here ({error})')
-            return False
-        except RuntimeError:  # rclpy's, whose text is about parts of ROS
-            self._refuse(name, f'ROS refuses to subscribe to it as {type_name}')
-            return False
-        description = bag_topic(name, type_name, publishers)
-        if description.definition is None:
-            self.warn_once(f'{name}: no definition of {type_name} here, so that few can read it')
-        self._thread.add_topic(recorder.topic, description)
-        recorder.set_described(len(publishers))
-        self.recorders[name] = recorder
-        self._make_tf(recorder)
-        return True
+            try:
+                self._subscribe(recorder, publishers)
+            except RuntimeError:
+                if number > before:
+                    raise
+            else:
+                break
+        return recorder
 
     def _make_tf(self, recorder: TopicRecorder) -> None:
         """Let `/tf` be made from the transforms of a simulator if no tf2_msgs is installed."""
@@ -141,9 +168,12 @@ class TopicDiscovery:
         made_from = [r.name for r in self.recorders.values() if r.tf_topic is not None]
         self._thread.call(lambda writer: writer.custom(*transforms.note(made_from)))
 
-    def _refuse(self, name: str, why: str) -> None:
-        self._refused.add(name)
+    def _refuse(self, name: str, type_name: str, why: str) -> None:
+        """Leave out a type of a topic, and let the bag and the last line say so."""
+        self.refused[name, type_name] = why
         self._log.warning(f'{name} is not recorded: {why}')
+        key = f'{topics.Loss.NOT_RECORDED} {name}'
+        self._thread.call(lambda writer: writer.custom(key, why))
 
     def _is_own(self, publisher: TopicEndpointInfo) -> bool:
         own = self._node.get_name(), self._node.get_namespace()

@@ -118,7 +118,7 @@ class RecorderNode(Node):
         failure = writer.failure or polling.failure
         if failure is not None:
             raise failure
-        return diagnostics.summary(self.writer, self._losses())
+        return diagnostics.summary(self.writer, self._losses(), self._discovery.refused)
 
     def _record_rest(self) -> None:
         with self._delivery.lock:
@@ -226,7 +226,7 @@ def _trigger(action: Callable[[], str]) -> Callable[[Any, Any], Any]:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Record until Ctrl-C or SIGTERM.
+    """Record until Ctrl-C, SIGTERM, SIGHUP or SIGQUIT.
 
     Returns:
         The exit code: 0, 1 if the disk refused, 2 for bad arguments or parameters.

@@ -32,6 +32,7 @@ class TopicRecorder:
     Attributes:
         name: Name of the topic.
         type_name: Such as 'nav_msgs/msg/Odometry'.
+        label: The name, with the type where it is not the first of this topic.
         topic: The topic in the bag.
         tf_topic: `/tf` of the bag, if it is made from this topic.
         publisher_count: Number of matched publishers.
@@ -39,6 +40,8 @@ class TopicRecorder:
         dropped: Messages that arrived and were not recorded, because too many waited.
         lost: Messages that the middleware reported as lost.
         missing: Gaps in the sequence numbers of the only publisher.
+        is_late: The topic was recorded before with another type: what its publisher sent until
+            the subscription was matched is missing as well.
     """
 
     def __init__(
@@ -56,12 +59,13 @@ class TopicRecorder:
         Raises:
             ImportError: The type is not installed.
         """
-        self.name = name
+        self.name = self.label = name
         self.type_name = type_name
         self.topic = BagTopic()
         self.tf_topic: BagTopic | None = None
         self.publisher_count = 0
         self.received = self.dropped = self.lost = self.missing = 0
+        self.is_late = False
         self._type = message_type(type_name)
         self._node = node
         self._deliver = deliver
@@ -217,8 +221,11 @@ class TopicRecorder:
     def _count(self, number: int) -> None:
         self.received += 1
         if self.publisher_count == 1 and not self._superseded:
-            if self._next_number is not None and number > self._next_number:
-                self.missing += number - self._next_number
+            expected = self._next_number
+            if expected is None and self.is_late and self.received == 1 and not self.latched:
+                expected = 1  # of the first message of a publisher
+            if expected is not None and number > expected:
+                self.missing += number - expected
             self._next_number = number + 1
 
 
