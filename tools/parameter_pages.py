@@ -78,6 +78,11 @@ nothing; a default name that is taken gets a number, such as `_2`.
 - **Losses.** `/diagnostics`, the log and `custom_data` of the bag report, for each topic: `lost`
   (lost by the middleware), `gaps` (numbers missing in the sequence of a topic with one publisher)
   and `dropped` (512 MiB already waited for the disk). A message can be in both `lost` and `gaps`.
+  The cause seen so far is a machine under load that does not let the receiving thread of the
+  middleware run: the queue of the shared memory, 512 messages, overflows, and the publisher
+  repeats only what it still has, every 3 s. At load 16 on two cores, `sim_node` at 1 kHz kept
+  2000 messages of each topic, and in three runs 2, 2 and 33 of 260,917, 254,513 and 256,013
+  messages were lost; each was reported.
   Once a second `/diagnostics` also reports the amounts recorded and waiting, the greatest delay
   before a message was taken, and the free space on the disk.
 - **Two recorders.** A second recorder of the same name writes another bag, and both warn.

@@ -140,8 +140,10 @@ class _Signals:
             raise KeyboardInterrupt(self._received)
 
     def _take(self, number: int, _: object) -> None:
-        for other in _SIGNALS:  # this program is ending already
-            signal.signal(other, signal.SIG_IGN)
+        # This program is ending already. Not SIG_IGN: a process that is still started would
+        # inherit it, and ignore the SIGTERM that ends it.
+        for other in _SIGNALS:
+            signal.signal(other, lambda *_: None)
         self._received = number
         if not self._held:
             raise KeyboardInterrupt(number)

@@ -15,7 +15,7 @@ def _reliable(depth: int, durability: DurabilityPolicy = DurabilityPolicy.VOLATI
     )
 
 
-STATE_QOS = _reliable(1000)  # a recorder that is late for 100 ms of 10 kHz loses nothing
+STATE_QOS = _reliable(2000)  # a recorder that is late for 0.2 s of 10 kHz loses nothing
 LATCHED_QOS = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)  # a late subscriber gets the last one
 COMMAND_QOS = _reliable(100)
 CLOCK_QOS = _reliable(1)  # only the newest time counts; best-effort subscribers get it as well

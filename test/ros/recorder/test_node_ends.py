@@ -12,8 +12,10 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from std_msgs.msg import String
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Int64, String
 
+from disc_sim_ros import topics
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
 from ros.recorder_process import MAIN, Counter, counts
@@ -137,3 +139,39 @@ def test_a_folder_that_is_removed_ends_it_with_a_line(ros, record):
     assert recorder.wait() == 1
     assert 'removed' in recorder.log.splitlines()[-1]
     assert 'Traceback' not in recorder.log
+
+
+def test_a_simulator_that_ends_delivers_its_last_messages(ros, record):
+    """The recorder is stalled meanwhile, as on a machine under load."""
+    recorder = record()
+    sim = ros.start({'publish_rate': 100.0, 'launch.height': 100.0})
+    recorder.wait_for_topics('/odom', '/pose', '/spin_rate', '/aero_wrench')
+    odom = ros.subscribe(Odometry, topics.ODOM)
+    ros.spin_until(lambda: len(odom) > 50, 'a flight')
+    recorder.process.send_signal(signal.SIGSTOP)
+    sim.process.send_signal(signal.SIGINT)
+    time.sleep(0.3)
+    recorder.process.send_signal(signal.SIGCONT)
+    assert sim.wait() == 0
+    assert recorder.end() == 0
+    assert 'nothing lost' in recorder.log.splitlines()[-1]
+    bag = open_bag(recorder.bag)
+    ends = {}
+    for message in bag.raw(['/odom', '/pose', '/spin_rate', '/aero_wrench']):
+        ends[message.topic] = message.publish_time
+    assert max(ends.values()) - min(ends.values()) < 1_000_000, 'all end with the same step'
+
+
+def test_the_last_messages_of_1200_topics_are_kept(ros, record):
+    recorder = record()
+    publishers = [ros.node.create_publisher(Int64, f't{i}', 10) for i in range(1200)]
+    ros.spin_until(
+        lambda: all(p.get_subscription_count() for p in publishers), 'all subscriptions'
+    )
+    for n, publisher in enumerate(publishers):
+        publisher.publish(Int64(data=n))
+        time.sleep(0.001)  # the middleware passes on 512 messages at most at a time
+    assert recorder.end() == 0
+    assert 'nothing lost' in recorder.log.splitlines()[-1]
+    filled = [t.message_count for t in open_bag(recorder.bag).topics if t.name.startswith('/t')]
+    assert filled == [1] * 1200
