@@ -7,6 +7,7 @@ from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.environment import Air
 
 FRISBEE = disc_file.load_disc('frisbee')
+AS_PRINTED = disc_file.load_disc('frisbee_as_printed')
 VACUUM = Air(density=0.0)
 NO_GRAVITY = Air(density=0.0, gravity=0.0)
 

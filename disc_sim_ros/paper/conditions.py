@@ -64,7 +64,7 @@ def percent(share: float) -> str:
 @cache
 def frisbee(share: float = PRINTED) -> Disc:
     """Return the paper's disc with a share of its printed roll and pitch damping."""
-    disc = disc_file.load_disc('frisbee')
+    disc = disc_file.load_disc('frisbee_as_printed')
     return replace(disc, C_Lp=share * disc.C_Lp, C_Mq=share * disc.C_Mq)
 
 

@@ -25,6 +25,7 @@ from disc_sim_ros.validation import Quantity
 
 DEFAULT_DISC = 'frisbee'
 _FOLDER = files('disc_sim_ros.physics') / 'discs'
+_FORMER = {'frisbee_low_damping': 'frisbee'}  # names of 0.1
 _LONGEST_NAME = 100  # of a file, in a message
 _LARGEST_FILE = 1 << 17  # bytes; the largest disc of the package has 4 kB, and 1 MB takes seconds
 
@@ -115,6 +116,8 @@ def _entry(name: str) -> dict[str, Any]:
     if name not in disc_names():
         close = difflib.get_close_matches(name, disc_names(), n=1)
         guess = f'did you mean {close[0]}? ' if close else ''
+        if name in _FORMER:
+            guess = f'it is called {_FORMER[name]} now; '
         allowed = f'{guess}choose from {", ".join(disc_names())} or give a .yaml file'
         raise ConfigError('disc', name, allowed)
     return _merged(_parse(name, (_FOLDER / f'{name}.yaml').read_text(encoding='utf-8')), name)

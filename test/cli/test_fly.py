@@ -49,7 +49,7 @@ def test_without_samples_the_document_holds_no_arrays(document):
 
 def test_the_document_repeats_the_launch(document):
     arguments = {
-        '--disc': ('disc', 'frisbee_low_damping'),
+        '--disc': ('disc', 'frisbee_as_printed'),
         '--model': ('model', 'constant_spin'),
         '--aero': ('aero', 'linear'),
         '--moment-axes': ('moment_axes', 'wind'),
@@ -118,9 +118,10 @@ def test_the_arrays_agree_with_each_other(document, arguments):
     assert_allclose(arrays['absolute_attitude_deg'], tilt, rtol=0.0, atol=3e-6)
     ratio = arrays['spin_rad_s'] * DIAMETER / (2 * airspeed)  # eqn 63
     assert_allclose(arrays['advance_ratio'], ratio, rtol=0.0, atol=ROUNDING)
-    # Central differences: h^2 / 6 of the second derivative of the velocity, below 1e3 m/s^3.
+    # Central differences: h^2 / 6 of the second derivative of the velocity, below 2e3 m/s^3: a
+    # wobble of 5 rad/s lasts.
     slope = (arrays['position_m'][2:] - arrays['position_m'][:-2]) * rate / 2
-    assert_allclose(slope, arrays['velocity_m_s'][1:-1], rtol=0.0, atol=1e3 / rate**2 / 6)
+    assert_allclose(slope, arrays['velocity_m_s'][1:-1], rtol=0.0, atol=2e3 / rate**2 / 6)
 
 
 @pytest.mark.parametrize('arguments', LAUNCHES.values(), ids=LAUNCHES)

@@ -140,7 +140,7 @@ def test_aero_linear_flies_as_the_linear_disc(document):
     [
         ('--moment-axes', 'wind'),
         ('--disc', 'ultrastar'),
-        ('--disc', 'frisbee_low_damping'),
+        ('--disc', 'frisbee_as_printed'),
         ('--disc', 'frisbee_roll_moment'),
         ('--turbulence', 5),
     ],

@@ -102,7 +102,7 @@ def test_throw_replaces_a_flying_disc_and_reports_its_own_flight(ros):
     output = run('throw.py', '--speed', '15')
     assert output.splitlines() == [
         'thrown: 15.00 m/s, spin 31.42 rad/s',
-        'landed: 26.35 m in 3.669 s',
+        'landed: 25.80 m in 3.682 s',
     ]
 
 
@@ -126,7 +126,7 @@ def test_throw_reports_that_the_simulator_refused(ros, load, capsys):
 def test_main_can_be_called(ros, load, capsys):
     ros.start(WAITING)
     assert load('throw.py').main(['--speed', '15']) == 0
-    assert 'landed: 26.35 m in 3.669 s' in capsys.readouterr().out
+    assert 'landed: 25.80 m in 3.682 s' in capsys.readouterr().out
 
 
 def test_throw_can_be_interrupted(ros):

@@ -48,8 +48,8 @@ def test_every_disc_has_a_description(name):
                 'area': math.pi * 0.275**2 / 4,
                 'inertia_axial': 2.4e-3,
                 'inertia_diametral': 1.2e-3,
-                'C_Lp': -1.30,
-                'C_Mq': -1.40,
+                'C_Lp': -0.130,
+                'C_Mq': -0.140,
                 'C_Nr': -1.83e-3,
                 'aero': 'table',
             },
@@ -139,11 +139,12 @@ def test_the_spin_roll_moment_changes_nothing_else():
     assert frisbee.spin_roll_moment is None
 
 
-def test_low_damping_changes_only_roll_and_pitch_damping_to_a_tenth():
-    disc, frisbee = disc_file.load_disc('frisbee_low_damping'), disc_file.load_disc('frisbee')
-    assert disc.C_Lp == pytest.approx(0.1 * frisbee.C_Lp, rel=1e-15)
-    assert disc.C_Mq == pytest.approx(0.1 * frisbee.C_Mq, rel=1e-15)
-    assert_same_disc(disc, frisbee, but=('C_Lp', 'C_Mq'))
+def test_the_frisbee_has_a_tenth_of_the_printed_roll_and_pitch_damping():
+    printed, frisbee = disc_file.load_disc('frisbee_as_printed'), disc_file.load_disc('frisbee')
+    assert (printed.C_Lp, printed.C_Mq) == (-1.30, -1.40)  # below eqn 25
+    assert frisbee.C_Lp == pytest.approx(0.1 * printed.C_Lp, rel=1e-15)
+    assert frisbee.C_Mq == pytest.approx(0.1 * printed.C_Mq, rel=1e-15)
+    assert_same_disc(printed, frisbee, but=('C_Lp', 'C_Mq'))
 
 
 def test_the_ultrastar_has_the_steady_coefficients_and_the_roll_moment_of_the_frisbee():
@@ -241,14 +242,14 @@ def test_based_on_merges_damping_and_lines_key_by_key(user_file):
 
 
 def test_based_on_goes_through_several_files(user_file):
-    disc = disc_file.load_disc(user_file('based_on: frisbee_low_damping\naero: linear\n'))
-    assert (disc.C_Lp, disc.mass, disc.aero) == (-0.130, 0.175, 'linear')
+    disc = disc_file.load_disc(user_file('based_on: frisbee_as_printed\naero: linear\n'))
+    assert (disc.C_Lp, disc.mass, disc.aero) == (-1.30, 0.175, 'linear')
 
 
 def test_loading_twice_gives_two_discs_that_do_not_share(user_file):
     """A change in a file must not affect the disc that it is based on."""
     disc_file.load_disc(user_file('based_on: frisbee\ndamping: {C_Mq: -2}\n'))
-    assert disc_file.load_disc('frisbee').C_Mq == -1.40
+    assert disc_file.load_disc('frisbee').C_Mq == -0.140
 
 
 @pytest.mark.parametrize(

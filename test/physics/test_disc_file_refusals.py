@@ -71,8 +71,8 @@ REFUSED = {
     'list for a key': (FRISBEE + '? [a]\n: 6\n', [f'line {AFTER}', 'not a word']),
     'doubled key': (FRISBEE + 'mass_kg: 0.2\n', [f'line {AFTER}', 'repeated key mass_kg']),
     'doubled key in a section': (
-        frisbee('  C_Mq: -1.40', '  C_Mq: -1.40\n  C_Mq: -1.40'),
-        ['line 13', 'repeated key C_Mq'],
+        frisbee('  C_Mq: -0.140', '  C_Mq: -0.140\n  C_Mq: -0.140'),
+        ['line 16', 'repeated key C_Mq'],
     ),
     'no mass': (frisbee('mass_kg: 0.175', ''), ['mass_kg', 'the key is missing']),
     'no diameter': (frisbee('diameter_m: 0.275', ''), ['diameter_m', 'the key is missing']),
@@ -150,10 +150,10 @@ REFUSED = {
         ['inertia_axial_kg_m2', '0.0025', 'twice', '0.0024 kg m^2'],
     ),
     'positive damping': (
-        frisbee('C_Mq: -1.40', 'C_Mq: 1.40'),
+        frisbee('C_Mq: -0.140', 'C_Mq: 1.40'),
         ['damping.C_Mq', '1.4', '<= 0'],
     ),
-    'nan for damping': (frisbee('C_Mq: -1.40', 'C_Mq: .nan'), ['damping.C_Mq', 'nan', 'finite']),
+    'nan for damping': (frisbee('C_Mq: -0.140', 'C_Mq: .nan'), ['damping.C_Mq', 'nan', 'finite']),
     'negative least drag': (
         frisbee('CD_0: 0.085', 'CD_0: -0.085'),
         ['linear.CD_0', '-0.085', '>= 0'],
@@ -334,6 +334,7 @@ def test_every_column_is_checked(user_file, column, value):
         ('/', ["'/'", 'frisbee']),
         ('../discs/frisbee', ['discs/frisbee', 'frisbee_linear']),
         ('Frisbee', ["'Frisbee'", 'did you mean frisbee?']),
+        ('frisbee_low_damping', ['it is called frisbee now', 'frisbee_as_printed']),
         ('nowhere.yaml', ["'nowhere.yaml'", 'cannot read it', 'No such file']),
         ('nowhere/mine.yaml', ['cannot read it', 'No such file']),
         ('a\nb\x1b[2J.yaml', [r'a\nb\x1b[2J.yaml', 'cannot read it']),

@@ -150,7 +150,7 @@ def test_the_rate_of_change_of_energy_is_negative_at_every_state(launch, setup):
         ('flat_plate', 'body', Launch(angle_of_attack=10.0, pitch_rate=1000.0)),
         ('flat_plate', 'body', Launch(angle_of_attack=-10.0, pitch_rate=-1000.0)),
         # In wind axes the damping of roll drives the spin, and that of spin the roll.
-        ('frisbee', 'wind', Launch(angle_of_attack=45.0, spin=300.0, roll_rate=-100.0)),
+        ('frisbee_as_printed', 'wind', Launch(angle_of_attack=45.0, spin=300.0, roll_rate=-100.0)),
     ],
 )
 def test_where_the_model_lets_energy_rise(disc, axes, launch):

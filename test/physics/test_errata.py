@@ -28,7 +28,7 @@ from disc_sim_ros.physics.kernels.equations import (
     moment,
 )
 from disc_sim_ros.physics.launch import Launch
-from sample_discs import FRISBEE, NO_GRAVITY, VACUUM
+from sample_discs import AS_PRINTED, NO_GRAVITY, VACUUM
 
 EXACT_ROUNDING = 1e-12  # a handful of products of numbers of order 1
 ATTITUDES = [(0.3, 0.4, 0.5), (-0.7, 0.2, 2.5), (1.2, -1.1, -3.0)]  # phi, theta, psi
@@ -191,7 +191,7 @@ def test_eqn_6_against_finite_differences(angles):
 def test_quaternion_rate_against_euler_rates(angles):
     """The package's rate of the despun axes, at (p, q, 0), through the corrected eqn 6."""
     pqr = (3.0, -2.0, 40.0)
-    disc = FRISBEE
+    disc = AS_PRINTED
     s = state((10.0, 1.0, 2.0), pqr, angles)
     plant = Setup(disc=disc).plant
     rate = derivative(s, STILL, plant, Control())
@@ -242,7 +242,7 @@ def test_lift_does_no_work(alpha, beta):
     """Eqn 31 with the corrected matrices is the package's force; eqns 35 to 37 are not."""
     speed = 11.0
     uvw = np.array(uvw_of(speed, alpha, beta))
-    plant = Setup(disc=FRISBEE).plant
+    plant = Setup(disc=AS_PRINTED).plant
     qS = 0.5 * plant.rho * speed**2 * plant.S
     a = flow(state(tuple(uvw)), STILL)
     F_2 = np.array(force(a, C, plant)) / qS
@@ -266,7 +266,7 @@ def test_gravity_points_down():
     assert_allclose(printed, down * (-1, -1, 1), atol=EXACT_ROUNDING)
     flight = fly(
         Launch(speed=0.0, roll=math.degrees(phi), pitch=math.degrees(theta), yaw=40.0, spin=0.0),
-        Setup(disc=FRISBEE, air=VACUUM),
+        Setup(disc=AS_PRINTED, air=VACUUM),
         duration=1.0,
         ground=False,
         sample_rate=1.0,
@@ -280,7 +280,7 @@ def test_gravity_points_down():
 def test_moments_act_in_axes_3_or_4(alpha, beta, moment_axes):
     """Eqns 22 to 24 and 32; eqns 38 to 40 print axes 4 with the transposed eqn 4."""
     speed, pqr = 11.0, np.array([1.5, -2.0, 40.0])
-    plant = Setup(disc=FRISBEE, moment_axes=moment_axes).plant
+    plant = Setup(disc=AS_PRINTED, moment_axes=moment_axes).plant
     control = Control(C_L=0.01, C_M=0.02, C_N=0.03)
     s = state(uvw_of(speed, alpha, beta), tuple(pqr))
     m = moment(flow(s, STILL), s, C, plant, control)
@@ -314,7 +314,7 @@ def test_moments_act_in_axes_3_or_4(alpha, beta, moment_axes):
 @pytest.mark.parametrize(('roll', 'pitch'), [(0.0, 0.01), (0.01, 0.0), (0.004, -0.02)])
 def test_eqns_53_and_54(roll, pitch, spin):
     """Eqn 11 as printed, in axes that spin, for a moment that does not, over ten nutations."""
-    I_z, I_x = FRISBEE.inertia_axial, FRISBEE.inertia_diametral
+    I_z, I_x = AS_PRINTED.inertia_axial, AS_PRINTED.inertia_diametral
     inertia = np.array([I_x, I_x, I_z])
 
     def rate(_, y):
@@ -386,7 +386,7 @@ def test_eqns_57_61_and_64(ratio):
 def test_constant_spin_keeps_the_wobble(model):
     """The paper says that eqns 47 to 49 have no wobble. In vacuum it continues undamped."""
     launch = Launch(speed=0.0, pitch=0.0, roll_rate=5.0)
-    setup = Setup(disc=FRISBEE, air=NO_GRAVITY, model=model)
+    setup = Setup(disc=AS_PRINTED, air=NO_GRAVITY, model=model)
     t = fly(launch, setup, duration=1.0, ground=False, sample_rate=100.0).trajectory
     wobble = np.hypot(t.rates[:, 0], t.rates[:, 1])
     # RK4 damps by (h w)^6 / 144 per step, w = 63 rad/s: 4e-10, 4e-7 in 1000 steps.
@@ -412,10 +412,10 @@ def fig5_read():
 
 
 @functools.cache
-def fig5_flight(share=1.0, spin_damping=FRISBEE.C_Nr, disc=FRISBEE, rate=5.0, **options):
+def fig5_flight(share=1.0, spin_damping=AS_PRINTED.C_Nr, disc=AS_PRINTED, rate=5.0, **options):
     """The flight of Fig. 5 with a share of the printed roll and pitch damping."""
     disc = dataclasses.replace(
-        disc, C_Lp=share * FRISBEE.C_Lp, C_Mq=share * FRISBEE.C_Mq, C_Nr=spin_damping
+        disc, C_Lp=share * AS_PRINTED.C_Lp, C_Mq=share * AS_PRINTED.C_Mq, C_Nr=spin_damping
     )
     setup = Setup(disc=disc, **options)
     return fly(Launch(), setup, duration=4.0, ground=False, sample_rate=rate).trajectory
@@ -445,9 +445,9 @@ def rms_to_fig5(t, first=1, suffix=''):
         (0.1, 0.0, 0, (0.10, 0.57, 0.24)),
         (0.01, 0.0, 0, (0.10, 0.42, 0.21)),
         # 3 % of the spin lost in 4 s, without the poorly digitised first row.
-        (1.0, FRISBEE.C_Nr, 1, (0.178, 1.727, 1.162)),
-        (0.1, FRISBEE.C_Nr, 1, (0.046, 0.607, 0.385)),
-        (0.01, FRISBEE.C_Nr, 1, (0.051, 0.614, 0.482)),
+        (1.0, AS_PRINTED.C_Nr, 1, (0.178, 1.727, 1.162)),
+        (0.1, AS_PRINTED.C_Nr, 1, (0.046, 0.607, 0.385)),
+        (0.01, AS_PRINTED.C_Nr, 1, (0.051, 0.614, 0.482)),
     ],
 )
 def test_distance_to_fig_5(share, spin_damping, first, expected):
@@ -462,7 +462,7 @@ def test_distance_to_fig_5(share, spin_damping, first, expected):
 
 
 @pytest.mark.paper
-@pytest.mark.parametrize('spin_damping', [0.0, FRISBEE.C_Nr])
+@pytest.mark.parametrize('spin_damping', [0.0, AS_PRINTED.C_Nr])
 @pytest.mark.parametrize(('share', 'met'), [(1.0, False), (0.1, True), (0.01, True)])
 def test_fig_5_is_met_at_low_damping(share, met, spin_damping):
     rms = rms_to_fig5(fig5_flight(share, spin_damping))
@@ -485,7 +485,7 @@ def test_fig_5_plots_despun_angles():
 def test_fig_5_has_constant_spin():
     """Its AdvR and V together give the spin; 3 % lost in 4 s would be -0.24 rad/s each second."""
     read = fig5_read()[1:]
-    spin = 2 * read['V'] * read['AdvR'] / FRISBEE.diameter
+    spin = 2 * read['V'] * read['AdvR'] / AS_PRINTED.diameter
     slope = np.polyfit(read['t_s'], spin, 1)[0]
     assert abs(slope) < 0.5 * 0.03 * 31.416 / 4.0  # closer to no loss than to 3 %
     # The mean, 29.9 rad/s, is 5 % below the 5 rev/s of the text at all times; unexplained.
@@ -499,8 +499,8 @@ def test_fig_5_has_constant_spin():
 )
 def test_grey_curves_of_fig_5(moment_line, phi_end, rms_phi):
     """They end at a roll of -38 degrees, as with a moment line that the paper does not print."""
-    line = dataclasses.replace(FRISBEE.linear, CM_0=moment_line[0], CM_alpha=moment_line[1])
-    disc = dataclasses.replace(FRISBEE, linear=line)
+    line = dataclasses.replace(AS_PRINTED.linear, CM_0=moment_line[0], CM_alpha=moment_line[1])
+    disc = dataclasses.replace(AS_PRINTED, linear=line)
     t = fig5_flight(disc=disc, aero='linear')
     # Half the last digit of docs/deviations.md.
     assert quantities(t)['phi'][-1] == pytest.approx(phi_end, abs=0.05)
@@ -513,10 +513,10 @@ def test_grey_curves_of_fig_5(moment_line, phi_end, rms_phi):
 @pytest.mark.parametrize(
     ('moment_axes', 'spin_damping', 'change'),
     [
-        ('body', FRISBEE.C_Nr, -3.00),  # "approximately 3 %" of the text
+        ('body', AS_PRINTED.C_Nr, -3.00),  # "approximately 3 %" of the text
         ('body', 0.0, 0.0),
         ('wind', 0.0, 4.09),
-        ('wind', FRISBEE.C_Nr, 1.31),
+        ('wind', AS_PRINTED.C_Nr, 1.31),
     ],
 )
 def test_spin_after_four_seconds(moment_axes, spin_damping, change):
@@ -530,9 +530,9 @@ def test_axes_4_drive_the_spin():
     t = fig5_flight(spin_damping=0.0, rate=1000.0)
     u, v, _ = t.air_velocity.T
     p3 = (t.rates[:, 0] * u + t.rates[:, 1] * v) / np.hypot(u, v)
-    C_L = FRISBEE.C_Lp * p3 * FRISBEE.diameter / (2 * t.airspeed)
-    qSc = 0.5 * 1.225 * t.airspeed**2 * FRISBEE.area * FRISBEE.diameter
-    gain = np.trapezoid(qSc * C_L * np.sin(t.alpha), t.t) / FRISBEE.inertia_axial / t.spin[0]
+    C_L = AS_PRINTED.C_Lp * p3 * AS_PRINTED.diameter / (2 * t.airspeed)
+    qSc = 0.5 * 1.225 * t.airspeed**2 * AS_PRINTED.area * AS_PRINTED.diameter
+    gain = np.trapezoid(qSc * C_L * np.sin(t.alpha), t.t) / AS_PRINTED.inertia_axial / t.spin[0]
     simulated = fig5_flight(spin_damping=0.0, moment_axes='wind').spin
     # The flight changes with the spin to second order, 4 % of 4 %, plus the quadrature error.
     assert simulated[-1] / simulated[0] - 1 == pytest.approx(gain, abs=2e-3)
@@ -548,10 +548,10 @@ def test_roll_command_in_axes_4(moment_axes, spin_end):
         pitch=-30.0,
         roll=-45.0,
         angle_of_attack=5.0,
-        spin=theory.spin_rate(0.5, FRISBEE.diameter, 13.5),
+        spin=theory.spin_rate(0.5, AS_PRINTED.diameter, 13.5),
     )
     assert launch.spin == pytest.approx(49.1, abs=0.05)
-    setup = Setup(disc=FRISBEE, moment_axes=moment_axes)
+    setup = Setup(disc=AS_PRINTED, moment_axes=moment_axes)
     flight = fly(launch, setup, control=Control(C_L=0.1), duration=6.0, ground=False)
     assert flight.end.r == pytest.approx(spin_end, abs=0.05)  # half the last digit
 
@@ -625,9 +625,11 @@ def test_lift_is_weight_in_fig_10():
 ])  # fmt: skip
 def test_fig_12_has_no_gravity(gravity, share, depth):
     """The figure ends about 12 m down; the text describes a straight path at falling speed."""
-    spin = theory.spin_rate(0.34, FRISBEE.diameter, 19.0)
+    spin = theory.spin_rate(0.34, AS_PRINTED.diameter, 19.0)
     launch = Launch(speed=19.0, pitch=-20.0, angle_of_attack=-3.0, spin=spin)
-    disc = dataclasses.replace(FRISBEE, C_Lp=share * FRISBEE.C_Lp, C_Mq=share * FRISBEE.C_Mq)
+    disc = dataclasses.replace(
+        AS_PRINTED, C_Lp=share * AS_PRINTED.C_Lp, C_Mq=share * AS_PRINTED.C_Mq
+    )
     setup = Setup(disc=disc, air=Air(gravity=gravity))
     end = fly(launch, setup, control=Control(C_M=0.2), duration=4.0, ground=False).end
     assert abs(end.Z - depth) < 0.05  # half the last digit
@@ -653,7 +655,9 @@ def test_how_fast_a_wobble_dies(share, lowest, highest):
     At the printed damping it is -rho V S c^2 (C_Lp + C_Mq) / (8 I_x), for V falling from 15.0 to
     14.1 m/s. At a tenth of it lift and moment matter as much: only 1 to 4 is required.
     """
-    disc = dataclasses.replace(FRISBEE, C_Lp=share * FRISBEE.C_Lp, C_Mq=share * FRISBEE.C_Mq)
+    disc = dataclasses.replace(
+        AS_PRINTED, C_Lp=share * AS_PRINTED.C_Lp, C_Mq=share * AS_PRINTED.C_Mq
+    )
     wobbling, still = (
         fly(launch, Setup(disc=disc, model=model), duration=0.1, ground=False, sample_rate=1000.0)
         for launch, model in ((Launch(roll_rate=5.0), 'exact'), (Launch(), 'precession'))
@@ -668,10 +672,10 @@ def test_how_fast_a_wobble_dies(share, lowest, highest):
 def test_no_direction_no_push(alpha, spin):
     """The raw table has a little lift at +-90 degrees; the disc falls straight nevertheless."""
     launch = Launch(speed=10.0, pitch=0.0, angle_of_attack=alpha, spin=spin)
-    end = fly(launch, Setup(disc=FRISBEE), duration=2.0, ground=False).end
+    end = fly(launch, Setup(disc=AS_PRINTED), duration=2.0, ground=False).end
     assert (end.X, end.Y, end.p, end.q) == (0.0, 0.0, 0.0, 0.0)
 
-    plant, s = Setup(disc=FRISBEE).plant, launch.state()
+    plant, s = Setup(disc=AS_PRINTED).plant, launch.state()
     a = flow(s, STILL)
     at_90 = coefficients(a, s.r, plant)
     assert at_90.Lift == pytest.approx(-0.0038 if alpha > 0 else -0.0037, abs=0.00005)

@@ -59,6 +59,6 @@ def test_the_roll_and_pitch_damping_lies_between_those_of_the_logs():
 
 
 def test_the_printed_damping_kills_a_wobble_too_fast():
-    frisbee = load_disc('frisbee_roll_moment')
+    frisbee = load_disc('frisbee_as_printed')
     for log in LOGS.values():
         assert wobble_decay(simulated(frisbee, log, MIDDLE)) > WOBBLES[1]

@@ -18,7 +18,7 @@ from disc_sim_ros.physics.kernels.equations import (
     precession_rates,
 )
 from disc_sim_ros.physics.launch import Launch
-from sample_discs import FRISBEE
+from sample_discs import AS_PRINTED, FRISBEE
 
 WOBBLING = Launch(speed=14.0, pitch=20.0, spin=50.0, roll_rate=3.0, pitch_rate=1.0, height=2.0)
 STILL = Velocity(0.0, 0.0, 0.0)
@@ -186,8 +186,8 @@ def test_a_step_too_long_for_the_speed_is_refused():
     """Even at a slow spin, as damping and pitch stiffness grow with speed."""
     fast = Launch(speed=60.0, pitch=5.0, spin=1.0)
     with pytest.raises(ConfigError, match=r'step.*60 m/s'):
-        fly(fast, Setup(disc=FRISBEE, step=0.1))
-    fine = fly(fast, Setup(disc=FRISBEE, step=1e-3), duration=1.0, ground=False)
+        fly(fast, Setup(disc=AS_PRINTED, step=0.1))
+    fine = fly(fast, Setup(disc=AS_PRINTED, step=1e-3), duration=1.0, ground=False)
     for step in (5e-3, 1e-2):  # allowed, and then accurate to 10 mm
-        coarse = fly(fast, Setup(disc=FRISBEE, step=step), duration=1.0, ground=False)
+        coarse = fly(fast, Setup(disc=AS_PRINTED, step=step), duration=1.0, ground=False)
         assert_allclose(coarse.end[:3], fine.end[:3], atol=1e-2)

@@ -18,7 +18,7 @@ from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, Setup, fly
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
-from sample_discs import FRISBEE
+from sample_discs import AS_PRINTED, FRISBEE
 
 pytestmark = pytest.mark.paper
 
@@ -143,13 +143,13 @@ def test_a_disc_carried_by_the_wind_falls_freely():
 def test_damping_and_control_act_where_the_flow_has_no_direction(alpha):
     """Flat side first, damping acts on a wobble, and control about the disc's own x axis."""
     launch = Launch(speed=15.0, pitch=0.0, angle_of_attack=alpha, spin=40.0, roll_rate=2.0)
-    t = free(launch, 0.3, setup=Setup(disc=FRISBEE, air=Air(gravity=0.0)))
+    t = free(launch, 0.3, setup=Setup(disc=AS_PRINTED, air=Air(gravity=0.0)))
     wobble = np.hypot(t.rates[:, 0], t.rates[:, 1])
     assert wobble[-1] < 0.3 * wobble[0]
     still = dataclasses.replace(launch, roll_rate=0.0, spin=0.0)
-    setup = Setup(disc=FRISBEE, air=Air(gravity=0.0), step=1e-5)
+    setup = Setup(disc=AS_PRINTED, air=Air(gravity=0.0), step=1e-5)
     end = fly(still, setup, duration=2e-4, ground=False, control=Control(C_L=0.05)).end
-    L = 0.05 * 0.5 * RHO * 15.0**2 * FRISBEE.area * FRISBEE.diameter
+    L = 0.05 * 0.5 * RHO * 15.0**2 * AS_PRINTED.area * AS_PRINTED.diameter
     # The disc rolls by 2e-6 rad, 2 % of the roll at which the flow has a direction again.
-    assert end.p == pytest.approx(L / FRISBEE.inertia_diametral * 2e-4, rel=0.03)
+    assert end.p == pytest.approx(L / AS_PRINTED.inertia_diametral * 2e-4, rel=0.03)
     assert end.q == pytest.approx(0.0, abs=0.03 * end.p)

@@ -118,7 +118,7 @@ def test_the_wind_and_the_disc_can_be_varied():
     ('name', 'spin', 'speed'),
     [
         ('frisbee', 31.4, 20.0),
-        ('frisbee_low_damping', 31.4, 20.0),
+        ('frisbee_as_printed', 31.4, 20.0),
         ('ultrastar', 60.0, 20.0),
         ('teebird', 110.0, 25.0),
         ('wraith', 120.0, 25.0),
