@@ -53,6 +53,30 @@ ADVANCE_RATIO = Quantity(
     'Advance ratio r c / (2 V) at release', 'clockwise from above positive',
 )  # fmt: skip
 
+# The same release in the words of disc golf; the arguments of physics.thrower.
+THROWER = _table(
+    Quantity(
+        'launch_angle', 'degrees', -180.0, 180.0, None,
+        'Angle of the velocity above the horizontal',
+    ),
+    Quantity(
+        'nose', 'degrees', -180.0, 180.0, 0.0,
+        'Angle of the nose above the velocity, the angle of attack', 'nose up positive',
+    ),
+    Quantity(
+        'hyzer', 'degrees', -180.0, 180.0, 0.0,
+        'Tilt towards the side to which the disc fades', 'hyzer positive, anhyzer negative',
+    ),
+)  # fmt: skip
+ALTITUDE = Quantity(
+    'altitude', 'm', -500.0, 11_000.0, 0.0,
+    'Altitude above the sea, which gives the density of the air (standard atmosphere)',
+)  # fmt: skip
+TEMPERATURE = Quantity(
+    'temperature', 'degC', -80.0, 60.0, None,
+    'Temperature of the air (default: that of the standard atmosphere, 15 at the sea)',
+)  # fmt: skip
+
 # The air; the fields of physics.environment.Wind and Air.
 MEAN_WIND = _table(
     Quantity(
@@ -302,5 +326,7 @@ QUANTITIES = {
     **RECORDING,
     **BAG_FILES,
     **STUDY,
+    **THROWER,
     **_table(POSITION, VELOCITY, ORIENTATION, STEP, DURATION, SAMPLE_RATE),
+    **_table(ALTITUDE, TEMPERATURE),
 }

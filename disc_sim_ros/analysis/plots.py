@@ -78,6 +78,27 @@ def flight_figure(flight: 'Flight') -> Figure:
     return figure
 
 
+def comparison_figure(flights: 'Sequence[Flight]', names: 'Sequence[str]') -> Figure:
+    """Return a figure of several sampled flights: side view and top view to scale."""
+    figure = Figure(figsize=(11, 8), layout='constrained')
+    FigureCanvasAgg(figure)
+    side, top = figure.subplots(2, 1)
+    for i, (flight, name) in enumerate(zip(flights, names, strict=True)):
+        colour, style = COLOURS[i % len(COLOURS)], _STYLES[i // len(COLOURS) % len(_STYLES)]
+        x, y, z = columns(flight.trajectory)['position_m'].T
+        for axis, across, end in ((side, z, 0.0), (top, y, flight.position[1])):
+            axis.plot(x, across, color=colour, ls=style, label=text_of(name))
+            if flight.landed:
+                axis.plot(flight.position[0], end, 'x', color=colour, ms=9, mew=2)
+    for axis, across in ((side, 'height z, m'), (top, 'left y, m')):
+        axis.set(xlabel='forward x, m', ylabel=across)
+        axis.set_aspect('equal', adjustable='datalim')
+        axis.grid(alpha=0.3)
+    side.axhline(0.0, color='0.6', lw=0.8)
+    side.legend(loc='best')
+    return figure
+
+
 def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
     """Return a figure of one or more recorded flights.
 

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 import re
 from typing import Any, NoReturn
 
+from disc_sim_ros import units
 from disc_sim_ros.errors import ConfigError, brief, printable
 from disc_sim_ros.validation import Quantity
 
-# argparse takes only -1 and -1.5 for numbers, and would read -1e-3 or -inf as a flag.
-_NEGATIVE = re.compile(r'^-(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?$|^-(inf|infinity|nan)$', re.I)
+# argparse takes only -1 and -1.5 for numbers, and would read -1e-3, -5mph or -inf as a flag.
+_NEGATIVE = re.compile(
+    r'^-(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?( ?[a-z°/^0-9]+)?$|^-(inf|infinity|nan)$', re.I
+)
 
 
 class Parser(argparse.ArgumentParser):
@@ -78,7 +81,7 @@ class FromText:
         quantity = self.quantities[0]
         number: float | int
         try:
-            number = quantity.check(_whole(text) if quantity.whole else _number(text))
+            number = quantity.check(_whole(text) if quantity.whole else _in_unit(text, quantity))
         except ConfigError as error:
             shown = brief(text if quantity.whole else error.value)
             message = f'{shown} is not allowed; {error.allowed}'
@@ -179,6 +182,24 @@ def _number(text: str) -> float | str:
         return text if '_' in text else float(text)
     except ValueError:
         return text
+
+
+def _in_unit(text: str, quantity: Quantity) -> float | str:
+    """Return the number of a text such as '60mph', in the unit of the quantity.
+
+    Raises:
+        ConfigError: The unit does not fit the quantity.
+    """
+    digits, unit = units.split(text)
+    if not unit:
+        return _number(text)
+    number = _number(digits)
+    factor = units.UNITS.get(quantity.unit, {}).get(unit)
+    if factor is None and isinstance(number, float):
+        allowed = units.spellings(quantity.unit)
+        also = f', in {allowed}' if allowed else ''
+        raise ConfigError('', text, f'{quantity.allowed}{also}')
+    return text if factor is None or isinstance(number, str) else number * factor
 
 
 def _whole(text: str) -> int | str:

@@ -3,10 +3,11 @@
 import argparse
 import math
 from pathlib import Path
+from typing import Any
 
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.physics import disc_file, flight, launch, theory
+from disc_sim_ros.physics import disc_file, flight, launch, theory, thrower
 from disc_sim_ros.physics.disc import AERODYNAMICS
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.frames import paper_from_map
@@ -14,12 +15,15 @@ from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.quantities import (
     ADVANCE_RATIO,
     AIR,
+    ALTITUDE,
     CONTROL,
     DURATION,
     LAUNCH,
     MEAN_WIND,
     SAMPLE_RATE,
     STEP,
+    TEMPERATURE,
+    THROWER,
     TIMING,
     WIND,
 )
@@ -38,14 +42,24 @@ _GIVEN_BY = {
 }
 
 
-def add_disc(p: Parser) -> None:
-    """Add the flags of the disc and of the model."""
+class _Discs(argparse.Action):
+    """Collects the values of several `--disc` in `discs`; `disc` is the first."""
+
+    def __call__(self, _: object, chosen: argparse.Namespace, value: Any, *__: object) -> None:
+        chosen.discs = [*getattr(chosen, 'discs', ()), value]
+        chosen.disc = chosen.discs[0]
+
+
+def add_disc(p: Parser, *, several: bool = False) -> None:
+    """Add the flags of the disc and of the model; `--disc` may be given several times."""
     what = p.add_argument_group('disc and model')
     what.add_argument(
         '--disc',
+        action=_Discs if several else 'store',
         default=disc_file.DEFAULT_DISC,
         metavar='NAME|FILE.yaml',
-        help=f'{", ".join(disc_file.disc_names())}, or your own file',
+        help=f'{", ".join(disc_file.disc_names())}, or your own file'
+        + ('; give it several times to compare discs' if several else ''),
     )
     what.add_argument(
         '--model', choices=tuple(flight.MODELS), default=flight.Setup.model, help='rigid body'
@@ -71,6 +85,7 @@ def add_launch(p: Parser) -> None:
     spin = group.add_mutually_exclusive_group()
     for name, quantity in LAUNCH.items():
         add_quantity(spin if name == 'spin' else group, LAUNCH_FLAGS[name], quantity)
+    add_thrower(p)
     add_quantity(
         spin,
         LAUNCH_FLAGS[ADVANCE_RATIO.name],
@@ -79,6 +94,24 @@ def add_launch(p: Parser) -> None:
         text='spin as r c / (2 speed), where c is the diameter of the disc',
         default=argparse.SUPPRESS,
     )
+
+
+def add_thrower(p: Parser) -> None:
+    """Add the flags of a release in the words of disc golf."""
+    group = p.add_argument_group(
+        "a thrower's words",
+        'In place of --pitch, --roll, --alpha and the sign of --spin. Numbers take units: 60mph, '
+        '1200rpm, 5ft, 90km/h.',
+    )
+    group.add_argument(
+        '--throw',
+        choices=tuple(thrower.THROWS),
+        default=argparse.SUPPRESS,
+        help='right or left hand, backhand or forehand: gives the sense of the spin',
+    )
+    for name, quantity in THROWER.items():
+        flag = f'--{name.replace("_", "-")}'
+        add_quantity(group, flag, quantity, default=argparse.SUPPRESS)
 
 
 def add_air(p: Parser, title: str) -> argparse._ArgumentGroup:
@@ -94,6 +127,8 @@ def add_air(p: Parser, title: str) -> argparse._ArgumentGroup:
     add_quantity(group, '--turbulence', WIND['turbulence'])
     add_quantity(group, '--seed', WIND['gust_seed'], dest='seed')
     add_quantity(group, '--air-density', AIR['air_density'])
+    for quantity in (ALTITUDE, TEMPERATURE):
+        add_quantity(group, f'--{quantity.name}', quantity, default=argparse.SUPPRESS)
     add_quantity(group, '--gravity', AIR['gravity'])
     return group
 
@@ -117,18 +152,20 @@ def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
         ConfigError: The flags contradict each other; `in_flags` returns it with the flag.
     """
     disc = disc_file.load_disc(chosen.disc)
-    spin = chosen.spin
+    spin = sense(chosen) * chosen.spin
     if hasattr(chosen, 'advance_ratio'):
         if chosen.speed == 0.0 and chosen.advance_ratio != 0.0:
             raise ConfigError('--advance-ratio', chosen.advance_ratio, 'at --speed 0 give --spin')
-        spin = theory.spin_rate(chosen.advance_ratio, disc.diameter, chosen.speed)
+        ratio = sense(chosen) * chosen.advance_ratio
+        spin = theory.spin_rate(ratio, disc.diameter, chosen.speed)
     values = {name: getattr(chosen, name) for name in LAUNCH} | {'spin': spin}
+    values |= _thrower_angles(chosen, spin)
     setup = flight.Setup(
         disc=disc,
         model=chosen.model,
         aero=getattr(chosen, 'aero', None),
         moment_axes=chosen.moment_axes,
-        air=Air(density=chosen.air_density, gravity=chosen.gravity),
+        air=_air(chosen),
         wind=Wind(
             mean=tuple(paper_from_map(chosen.wind).tolist()),
             turbulence=chosen.turbulence,
@@ -137,6 +174,54 @@ def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
         step=chosen.step,
     )
     return launch.Launch(**values), setup
+
+
+def sense(chosen: argparse.Namespace) -> int:
+    """Return 1 or -1, by which `--throw` multiplies the spin."""
+    if not hasattr(chosen, 'throw'):
+        return 1
+    given = getattr(chosen, ADVANCE_RATIO.name, chosen.spin)
+    if given < 0.0:
+        raise ConfigError('--throw', chosen.throw, 'it gives the sense of the spin: give no minus')
+    return thrower.THROWS[chosen.throw]
+
+
+def _thrower_angles(chosen: argparse.Namespace, spin: float) -> dict[str, float]:
+    """Return the angles of a launch that `--launch-angle`, `--nose` and `--hyzer` mean."""
+    given = {name: getattr(chosen, name) for name in THROWER if hasattr(chosen, name)}
+    if not given:
+        return {}
+    for name, replaced in (('hyzer', 'roll'), ('nose', 'angle_of_attack'), *_OTHERS):
+        if name in given and getattr(chosen, replaced) != LAUNCH[replaced].default:
+            flag = LAUNCH_FLAGS[replaced]
+            raise ConfigError(
+                f'--{name.replace("_", "-")}', given[name], f'give no {flag} with it'
+            )
+    nose = given.get('nose', 0.0)
+    return thrower.angles(
+        given.get('launch_angle', chosen.pitch - nose),
+        nose,
+        given.get('hyzer', 0.0),
+        yaw=chosen.yaw,
+        clockwise=spin >= 0.0,
+    )
+
+
+_OTHERS = (('launch_angle', 'pitch'), ('hyzer', 'sideslip'), ('nose', 'sideslip'))
+
+
+def _air(chosen: argparse.Namespace) -> Air:
+    """Return the air by its density, or by altitude and temperature."""
+    given = [name for name in (ALTITUDE.name, TEMPERATURE.name) if hasattr(chosen, name)]
+    if not given:
+        return Air(density=chosen.air_density, gravity=chosen.gravity)
+    if chosen.air_density != AIR['air_density'].default:
+        raise ConfigError('--air-density', chosen.air_density, f'give no --{given[0]} with it')
+    return thrower.air_at(
+        getattr(chosen, ALTITUDE.name, ALTITUDE.default),
+        getattr(chosen, TEMPERATURE.name, None),
+        gravity=chosen.gravity,
+    )
 
 
 def control_of(chosen: argparse.Namespace) -> Control:

@@ -30,7 +30,7 @@ def parser(prog: str = 'fly') -> Parser:
     )
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    flags.add_disc(p)
+    flags.add_disc(p, several=True)
     flags.add_launch(p)
     around = flags.add_air(p, 'air, control inputs and end of the flight')
     flags.add_duration(around)
@@ -43,6 +43,20 @@ def parser(prog: str = 'fly') -> Parser:
     )
     rates = SAMPLE_RATE.within(1e-3, 1e4)
     add_quantity(shown, '--samples', rates, dest='samples', text=text, default=argparse.SUPPRESS)
+    shown.add_argument(
+        '--units',
+        choices=('metric', 'us'),
+        default='metric',
+        help='of the table: m, m/s, rad/s or ft, mph, rpm',
+    )
+    shown.add_argument(
+        '--techdisc',
+        default=argparse.SUPPRESS,
+        metavar='FILE.csv',
+        help='fly the throws of this file of a TechDisc, one a row, from --height; columns '
+        'speedMph or speedKmh, spinRpm, launchAngle, noseAngle, hyzerAngle, and, if there, '
+        'wobbleAngle and throwType',
+    )
     shape = shown.add_mutually_exclusive_group()
     shape.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'
@@ -82,6 +96,9 @@ def _run(chosen: argparse.Namespace) -> int:
         output.check_plot(plot)
     in_file = csv is not None or plot is not None
     rate = getattr(chosen, 'samples', DEFAULT_RATE if in_file else 0.0)
+    several = hasattr(chosen, 'techdisc') or len(getattr(chosen, 'discs', ())) > 1
+    if several or chosen.units != 'metric':
+        return _compare(chosen, plot)
     release, setup = flags.thrown(chosen)
     write = None if bag is None else _bag_writer(chosen, bag, release, setup)
 
@@ -106,6 +123,42 @@ def _run(chosen: argparse.Namespace) -> int:
         lines.append(f'  wrote   {write()}')
     elif rate > 0.0:
         lines.append(flight_report.samples_text(flown.trajectory))
+    output.show('\n'.join(lines))
+    return 0
+
+
+def _compare(chosen: argparse.Namespace, plot: str | None) -> int:
+    """Fly each disc, with each throw of `--techdisc`, and show them side by side."""
+    for name in ('csv', 'bag'):
+        if hasattr(chosen, name):
+            allowed = 'it takes a single flight, in metric units'
+            raise ConfigError(f'--{name}', getattr(chosen, name), allowed)
+    from disc_sim_ros.analysis import comparison, flight_report, techdisc  # noqa: PLC0415
+
+    rate = getattr(chosen, 'samples', DEFAULT_RATE if plot is not None else 0.0)
+    throws = techdisc.throws(chosen.techdisc) if hasattr(chosen, 'techdisc') else []
+    discs = getattr(chosen, 'discs', [chosen.disc])
+    flown: dict[str, flight.Flight] = {}
+    for disc in discs:
+        chosen.disc = disc
+        release, setup = flags.thrown(chosen)
+        if not throws:
+            flown[disc] = _fly(chosen, release, setup, rate)
+        for throw in throws:
+            name = f'{disc} {throw.name}' if len(discs) > 1 else throw.name
+            launch = throw.launch(setup.disc, chosen.height)
+            flown[name] = _fly(chosen, launch, setup, rate)
+    names, flights = list(flown), list(flown.values())
+    if chosen.json:
+        documents = [{'name': n, **flight_report.document(f)} for n, f in flown.items()]
+        output.show(json.dumps({'flights': documents}, allow_nan=False))
+        return 0
+    lines = [comparison.table(names, flights, chosen.units)]
+    if plot is not None:
+        from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
+
+        output.write_plot(plot, plots.comparison_figure(flights, names))
+        lines.append(f'wrote {plot}')
     output.show('\n'.join(lines))
     return 0
 

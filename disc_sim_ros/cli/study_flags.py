@@ -155,7 +155,8 @@ def thrown(chosen: argparse.Namespace) -> tuple[Launch, flight.Setup, float | No
     """
     values = vars(chosen) | {'step': getattr(chosen, 'step', STEP.lowest)}
     release, setup = throw_flags.thrown(argparse.Namespace(**values))
-    return release, setup, getattr(chosen, 'advance_ratio', None)
+    ratio = getattr(chosen, 'advance_ratio', None)
+    return release, setup, ratio if ratio is None else ratio * throw_flags.sense(chosen)
 
 
 def check_given(
