@@ -144,6 +144,14 @@ LINEAR_AERO = _table(
     Quantity('CM_alpha', '1/rad', -inf, inf, None, 'Slope of the pitching moment'),
 )
 
+# The flight numbers of a golf disc, in the order in which makers print them.
+FLIGHT_NUMBERS = _table(
+    Quantity('speed_number', '', 1.0, 15.0, None, 'Speed of the flight numbers'),
+    Quantity('glide', '', 0.0, 7.0, None, 'Glide of the flight numbers'),
+    Quantity('turn', '', -6.0, 2.0, None, 'Turn of the flight numbers', 'right negative'),
+    Quantity('fade', '', -1.0, 7.0, None, 'Fade of the flight numbers', 'left positive'),
+)
+
 # Control inputs, in the paper's signs.
 CONTROL = _table(
     Quantity(
@@ -327,6 +335,7 @@ QUANTITIES = {
     **BAG_FILES,
     **STUDY,
     **THROWER,
+    **FLIGHT_NUMBERS,
     **_table(POSITION, VELOCITY, ORIENTATION, STEP, DURATION, SAMPLE_RATE),
     **_table(ALTITUDE, TEMPERATURE),
 }

@@ -57,8 +57,8 @@ def add_disc(p: Parser, *, several: bool = False) -> None:
         '--disc',
         action=_Discs if several else 'store',
         default=disc_file.DEFAULT_DISC,
-        metavar='NAME|FILE.yaml',
-        help=f'{", ".join(disc_file.disc_names())}, or your own file'
+        metavar='NAME|FILE.yaml|NUMBERS',
+        help=f'{", ".join(disc_file.disc_names())}, your own file, or flight numbers: 11/5/-1/3'
         + ('; give it several times to compare discs' if several else ''),
     )
     what.add_argument(
@@ -242,9 +242,9 @@ def parameters(
         near = 1.0 / round(1.0 / setup.step)
         allowed = f'nodes and bags need a whole number of steps a second; near is {near:.12g}'
         raise ConfigError('--step', setup.step, allowed, STEP.name)
-    disc = (
-        chosen.disc if chosen.disc in disc_file.disc_names() else str(Path(chosen.disc).absolute())
-    )
+    disc = chosen.disc
+    if disc_file.is_file(disc):
+        disc = str(Path(disc).absolute())
     quantities: dict[str, float] = {
         'air_density': setup.air.density,
         'gravity': setup.air.gravity,

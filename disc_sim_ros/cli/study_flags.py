@@ -41,14 +41,25 @@ def grids(texts: Iterable[str]) -> dict[str, tuple[float, ...]]:
 
 
 def laws(
-    normal: Iterable[str], uniform: Iterable[str], scatter: Iterable[str]
+    normal: Iterable[str],
+    uniform: Iterable[str],
+    scatter: Iterable[str],
+    disc: Mapping[str, float] | None = None,
 ) -> dict[str, Normal | Uniform]:
     """Return the distribution of each quantity of `--normal`, `--uniform` and `--scatter`.
+
+    Args:
+        normal: Values of this flag.
+        uniform: Values of this flag.
+        scatter: Values of this flag.
+        disc: Of `--scatter disc`: the uncertainty of the disc.
 
     Raises:
         ConfigError: A name twice, or numbers that define no such distribution.
     """
-    distributions: dict[str, Normal | Uniform] = {}
+    distributions: dict[str, Normal | Uniform] = {
+        name: Normal(sd) for name, sd in (disc or {}).items()
+    }
     for flag, form, texts in (
         ('--normal', 'NAME=MEAN,SD', normal),
         ('--uniform', 'NAME=LOW,HIGH', uniform),

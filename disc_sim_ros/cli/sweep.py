@@ -1,7 +1,7 @@
 """`sweep`: flies grids and random ensembles, without ROS."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -18,6 +18,7 @@ from disc_sim_ros.cli.main import UsageError, run_program
 from disc_sim_ros.cli.progress import ProgressBar, duration
 from disc_sim_ros.cli.study_flags import listed
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.quantities import STUDY
 
 if TYPE_CHECKING:
@@ -47,8 +48,10 @@ def parser(prog: str = 'sweep') -> Parser:
     study_flags.add_list(what, '--vary', 'NAME=START:STOP:STEP|START:STOP/N|A,B,C', text)
     study_flags.add_list(what, '--normal', 'NAME=MEAN,SD', 'normal scatter')
     study_flags.add_list(what, '--uniform', 'NAME=LOW,HIGH', 'uniform scatter')
-    text = 'normal scatter around the value of the grid or of the flag'
-    study_flags.add_list(what, '--scatter', 'NAME=SD', text)
+    text = (
+        'normal scatter around the value of the grid or of the flag, or of the disc as it states'
+    )
+    study_flags.add_list(what, '--scatter', 'NAME=SD|disc', text)
     text = 'correlation of two scattered quantities, from -1 to 1'
     study_flags.add_list(what, '--correlation', 'A,B=R', text)
     text = f'samples at each grid point (default: {DEFAULT_COUNT}; without scatter 1)'
@@ -156,8 +159,12 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
     from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
     vary = study_flags.grids(listed(chosen, 'vary'))
+    texts = listed(chosen, 'scatter')
     scatter = study_flags.laws(
-        *(listed(chosen, name) for name in ('normal', 'uniform', 'scatter'))
+        listed(chosen, 'normal'),
+        listed(chosen, 'uniform'),
+        [text for text in texts if text != 'disc'],
+        _uncertainty(chosen.disc) if 'disc' in texts else None,
     )
     if not vary and not scatter and not (hasattr(chosen, 'count') and chosen.turbulence):
         raise UsageError(
@@ -185,6 +192,18 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
         return study
     step = good_step(setup, study.fastest_spin)
     return replace(study, setup=replace(setup, step=step))
+
+
+def _uncertainty(name: str) -> Mapping[str, float]:
+    """Return the uncertainty of a disc, for `--scatter disc`."""
+    uncertainty = load_disc(name).uncertainty
+    if not uncertainty:
+        allowed = (
+            f'{name} states no uncertainty; give flight numbers, such as --disc 11/5/-1/3, or a '
+            'file with the section uncertainty'
+        )
+        raise ConfigError('--scatter', 'disc', allowed)
+    return uncertainty
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """A disc: mass, size, inertia and aerodynamic coefficients, checked on construction."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self
 
@@ -159,6 +160,9 @@ class Disc:
     spin_roll_moment: SpinTable | None = None  # rolling moment in axes 3
     spin_side_force: SpinTable | None = None  # C_Side, along y of axes 3
     description: str = ''
+    # Standard deviations of what is added to the coefficients: lift_offset, drag_offset,
+    # pitching_offset; empty where they are not known.
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, quantity in DISC.items():

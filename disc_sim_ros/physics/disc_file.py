@@ -18,9 +18,10 @@ import yaml
 
 from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError, brief
+from disc_sim_ros.physics import flight_numbers
 from disc_sim_ros.physics.disc import AERODYNAMICS, AeroTable, Disc, LinearAero, SpinTable
 from disc_sim_ros.physics.disc_checks import check_number
-from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
+from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO, VARIED
 from disc_sim_ros.validation import Quantity
 
 DEFAULT_DISC = 'frisbee'
@@ -32,7 +33,12 @@ _LARGEST_FILE = 1 << 17  # bytes; the largest disc of the package has 4 kB, and 
 _PROPERTIES = {quantity.key: quantity for quantity in DISC.values()}
 _DAMPING = {quantity.key: quantity for quantity in DAMPING.values()}
 _LINEAR = {quantity.key: quantity for quantity in LINEAR_AERO.values()}
-_NUMBERS: dict[str, dict[str, Quantity]] = {'damping': _DAMPING, 'linear': _LINEAR}
+_UNCERTAIN = {name: VARIED[name] for name in ('lift_offset', 'drag_offset', 'pitching_offset')}
+_NUMBERS: dict[str, dict[str, Quantity]] = {
+    'damping': _DAMPING,
+    'linear': _LINEAR,
+    'uncertainty': {name: quantity.within(0.0) for name, quantity in _UNCERTAIN.items()},
+}
 _TABLE = ('alpha_deg', 'CL', 'CD', 'CM')
 _SPIN = ('advance_ratio', 'alpha_deg', 'coefficient')
 _SECTIONS: dict[str, tuple[str, ...]] = {
@@ -41,6 +47,7 @@ _SECTIONS: dict[str, tuple[str, ...]] = {
     'table': _TABLE,
     'spin_roll_moment': _SPIN,
     'spin_side_force': _SPIN,
+    'uncertainty': tuple(_UNCERTAIN),
 }
 _BUILDERS: dict[str, Callable[..., Any]] = {
     'linear': LinearAero,
@@ -48,8 +55,8 @@ _BUILDERS: dict[str, Callable[..., Any]] = {
     'spin_roll_moment': SpinTable.of,
     'spin_side_force': SpinTable.of,
 }
-_KEYS = ('description', 'based_on', 'aero', *_PROPERTIES, *_SECTIONS)
-_OPTIONAL = {DISC['area'].key, *_DAMPING}
+_KEYS = ('description', 'based_on', 'flight_numbers', 'aero', *_PROPERTIES, *_SECTIONS)
+_OPTIONAL = {DISC['area'].key, *_DAMPING, *_UNCERTAIN}
 
 
 def disc_names() -> tuple[str, ...]:
@@ -59,21 +66,29 @@ def disc_names() -> tuple[str, ...]:
 
 
 def load_disc(name_or_file: str) -> Disc:
-    """Return a disc of the catalogue by name, or one from a user's YAML file.
+    """Return a disc of the catalogue, one from a user's YAML file, or one from flight numbers.
 
     Args:
-        name_or_file: A name of `disc_names`, or a path that ends in .yaml or .yml.
+        name_or_file: A name of `disc_names`, a path that ends in .yaml or .yml, or flight numbers
+            such as '11/5/-1/3'.
 
     Raises:
         ConfigError: No such disc or file, or a file that does not describe a disc; the message
             names the file, the key and what is allowed.
     """
-    path = Path(name_or_file)
-    if path.suffix in {'.yaml', '.yml'}:
+    if is_file(name_or_file):
+        path = Path(name_or_file)
         source = _shown(name_or_file)
         name = path.stem.encode(errors='replace').decode()  # plots cannot draw lone surrogates
         return _disc(name, _merged(_read(name_or_file, path), source), source)
-    return _disc(name_or_file, _entry(name_or_file), name_or_file)
+    numbers = flight_numbers.parse(name_or_file)
+    keys = _entry(name_or_file) if numbers is None else flight_numbers.keys(numbers, _entry)
+    return _disc(name_or_file, keys, name_or_file)
+
+
+def is_file(name_or_file: str) -> bool:
+    """Return True if a text names a disc file, not a disc of the catalogue or flight numbers."""
+    return Path(name_or_file).suffix.lower() in {'.yaml', '.yml'}
 
 
 def disc_document(disc: Disc) -> dict[str, Any]:
@@ -95,6 +110,8 @@ def disc_document(disc: Disc) -> dict[str, Any]:
         terms: SpinTable | None = getattr(disc, section)
         if terms is not None:
             document[section] = {key: getattr(terms, key).tolist() for key in _SPIN}
+    if disc.uncertainty:
+        document['uncertainty'] = dict(disc.uncertainty)
     return document
 
 
@@ -118,7 +135,8 @@ def _entry(name: str) -> dict[str, Any]:
         guess = f'did you mean {close[0]}? ' if close else ''
         if name in _FORMER:
             guess = f'it is called {_FORMER[name]} now; '
-        allowed = f'{guess}choose from {", ".join(disc_names())} or give a .yaml file'
+        names = ', '.join(disc_names())
+        allowed = f'{guess}choose from {names}, or give a .yaml file or numbers such as 11/5/-1/3'
         raise ConfigError('disc', name, allowed)
     return _merged(_parse(name, (_FOLDER / f'{name}.yaml').read_text(encoding='utf-8')), name)
 
@@ -129,9 +147,13 @@ def _merged(keys: dict[str, Any], source: str) -> dict[str, Any]:
     A table replaces the other table as a whole: half a table of each disc would mean nothing.
     """
     base_name = keys.pop('based_on', None)
-    if base_name is None:
+    numbers = keys.pop('flight_numbers', None)
+    if numbers is not None:
+        base_name, base = _numbered(numbers, base_name, source)
+    elif base_name is None:
         return keys
-    base = _entry(validation.choice(f'{source}: based_on', base_name, disc_names()))
+    else:
+        base = _entry(validation.choice(f'{source}: based_on', base_name, disc_names()))
     _scale_inertia(base, keys, base_name)
     for key, value in keys.items():
         if key in {'damping', 'linear'} and isinstance(value, dict):
@@ -139,6 +161,21 @@ def _merged(keys: dict[str, Any], source: str) -> dict[str, Any]:
         else:
             base[key] = value
     return base
+
+
+def _numbered(numbers: object, base_name: object, source: str) -> tuple[str, dict[str, Any]]:
+    """Return the name and the keys of the disc that the key `flight_numbers` describes."""
+    text = '/'.join(map(str, numbers)) if isinstance(numbers, list) else str(numbers)
+    thing = f'{source}: flight_numbers'
+    if base_name is not None:
+        raise ConfigError(thing, numbers, 'give one of based_on and flight_numbers')
+    try:
+        parsed = flight_numbers.parse(text)
+    except ConfigError as error:
+        raise error.named(f'{source}: {error.thing}') from None
+    if parsed is None:
+        raise ConfigError(thing, numbers, 'give speed/glide/turn/fade, such as 11/5/-1/3')
+    return text, flight_numbers.keys(parsed, _entry)
 
 
 def _scale_inertia(base: dict[str, Any], keys: dict[str, Any], base_name: str) -> None:
@@ -247,6 +284,8 @@ def _section(section: str, values: object, names: tuple[str, ...]) -> dict[str, 
         }
     if section == 'damping':
         return values
+    if section == 'uncertainty':
+        return {section: values}
     try:
         return {section: _BUILDERS[section](**values)}
     except ConfigError as error:

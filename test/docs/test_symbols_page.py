@@ -139,7 +139,7 @@ def test_flags_of_fly_exist_and_no_flag_of_a_launch_is_missing():
 
 
 def test_yaml_keys_are_those_of_the_catalogue():
-    properties = {*disc_file._PROPERTIES, 'description', 'based_on', 'aero'}
+    properties = {*disc_file._PROPERTIES, 'description', 'based_on', 'flight_numbers', 'aero'}
     sections = {f'{s}.{key}' for s, keys in disc_file._SECTIONS.items() for key in keys}
     assert elsewhere('YAML') == properties | sections
 
