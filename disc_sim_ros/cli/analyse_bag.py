@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
-from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError, printable
 
@@ -34,7 +34,7 @@ def parser(prog: str = 'analyse_bag') -> Parser:
     )
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    p.add_argument('bag', metavar='BAG', help='folder of the bag, or one .mcap file')
+    p.add_argument('bag', type=path, metavar='BAG', help='folder of the bag, or one .mcap file')
     p.add_argument(
         '--verify',
         action='store_true',

@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+import os
 import re
 from typing import Any, NoReturn
 
@@ -87,6 +88,11 @@ class FromText:
             message = f'{shown} is not allowed; {error.allowed}'
             raise argparse.ArgumentTypeError(message) from None
         return number
+
+
+def path(text: str) -> str:
+    """Return a path with a leading `~` as the home folder: a shell keeps it after a `=`."""
+    return os.path.expanduser(text)  # noqa: PTH111 - a Path would change 'a/', which is a folder
 
 
 def number(lowest: float, highest: float, unit: str) -> FromText:

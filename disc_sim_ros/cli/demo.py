@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Self
 import disc_sim_ros
 from disc_sim_ros import __version__, topics
 from disc_sim_ros.cli import flags, output
-from disc_sim_ros.cli.arguments import Parser, add_quantity
+from disc_sim_ros.cli.arguments import Parser, add_quantity, path
 from disc_sim_ros.cli.main import DIFFERENT, run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
@@ -47,6 +47,7 @@ def parser(prog: str = 'demo') -> Parser:
     add_quantity(kept, '--seconds', DURATION.within(0.1), dest='seconds', text=text)
     kept.add_argument(
         '--bag',
+        type=path,
         default=argparse.SUPPRESS,
         metavar='DIR',
         help='new folder for the bag; the plot is DIR.png (default: bag and flight.png in '

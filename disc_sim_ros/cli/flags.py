@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity
+from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import disc_file, flight, launch, theory, thrower
 from disc_sim_ros.physics.disc import AERODYNAMICS
@@ -55,6 +55,7 @@ def add_disc(p: Parser, *, several: bool = False) -> None:
     what = p.add_argument_group('disc and model')
     what.add_argument(
         '--disc',
+        type=path,
         action=_Discs if several else 'store',
         default=disc_file.DEFAULT_DISC,
         metavar='NAME|FILE.yaml|NUMBERS',

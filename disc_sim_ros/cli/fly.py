@@ -10,13 +10,14 @@ import time
 
 from disc_sim_ros import __version__, files
 from disc_sim_ros.cli import flags, output
-from disc_sim_ros.cli.arguments import Parser, add_quantity
+from disc_sim_ros.cli.arguments import Parser, add_quantity, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.quantities import SAMPLE_RATE
 
+STDOUT = '-'  # as the name of a file
 DEFAULT_RATE = 100.0  # Hz, of files without --samples
 
 
@@ -51,6 +52,7 @@ def parser(prog: str = 'fly') -> Parser:
     )
     shown.add_argument(
         '--techdisc',
+        type=path,
         default=argparse.SUPPRESS,
         metavar='FILE.csv',
         help='fly the throws of this file of a TechDisc, one a row, from --height; columns '
@@ -62,11 +64,16 @@ def parser(prog: str = 'fly') -> Parser:
         '--json', action='store_true', help='print one JSON document instead of the summary'
     )
     shape.add_argument(
-        '--csv', default=argparse.SUPPRESS, metavar='FILE', help='also write the samples as CSV'
+        '--csv',
+        type=path,
+        default=argparse.SUPPRESS,
+        metavar='FILE',
+        help='also write the samples as CSV; -: print them in place of the summary',
     )
     output.add_plot(shape)
     shape.add_argument(
         '--bag',
+        type=path,
         default=argparse.SUPPRESS,
         metavar='DIR',
         help='also write the bag that sim_node and recorder_node would record of this flight, to '
@@ -90,7 +97,7 @@ def _in_flags(error: ConfigError, chosen: argparse.Namespace, parser: Parser) ->
 
 def _run(chosen: argparse.Namespace) -> int:
     csv, plot, bag = (getattr(chosen, name, None) for name in ('csv', 'plot', 'bag'))
-    if csv is not None:
+    if csv not in {None, STDOUT}:
         output.check_writable('--csv', csv)
     if plot is not None:
         output.check_plot(plot)
@@ -109,6 +116,9 @@ def _run(chosen: argparse.Namespace) -> int:
         document = flight_report.document(flown)
         document['launch']['disc'] = chosen.disc  # of a file its path, so that it can fly again
         output.show(json.dumps(document, allow_nan=False))
+        return 0
+    if csv == STDOUT:
+        output.show(flight_report.csv_text(flown.trajectory).rstrip('\n'))
         return 0
     lines = [flight_report.summary(flown)]
     if csv is not None:

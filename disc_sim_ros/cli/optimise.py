@@ -138,7 +138,7 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
     )
     if hasattr(chosen, 'step'):
         return posed
-    step = good_step(setup, posed.fastest_spin)
+    step = good_step(setup, posed.fastest_spin, posed.fastest_rate)
     return replace(posed, study=replace(study, setup=replace(setup, step=step)))
 
 

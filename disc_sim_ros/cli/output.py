@@ -12,6 +12,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import files
+from disc_sim_ros.cli.arguments import path
 from disc_sim_ros.errors import ConfigError, DiscSimError, printable
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def add_plot(group: argparse._ActionsContainer) -> None:
     """Add the flag `--plot`."""
     group.add_argument(
         '--plot',
+        type=path,
         default=argparse.SUPPRESS,
         metavar='FILE.png',
         help='also write a plot; the name ends in .png, .svg or .pdf',
@@ -81,12 +83,15 @@ def write_whole(flag: str, name: str, content: bytes) -> None:
 
     Raises:
         ConfigError: The system refuses (no space, no permission, ...); the old file is unchanged.
+        ClosedStdoutError: It is a pipe whose reader has closed it.
     """
     try:
         if _is_special(Path(name)):  # it cannot be replaced
             Path(name).write_bytes(content)
         else:
             files.write_whole(Path(name).resolve(), content, keep_mode=True)
+    except BrokenPipeError:  # /dev/stdout, whose reader has read enough
+        raise ClosedStdoutError from None
     except OSError as error:
         raise ConfigError(flag, name, f'cannot write it ({error.strerror})') from None
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
-from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
@@ -41,7 +41,7 @@ def parser(prog: str = 'paper_figures') -> Parser:
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     text = 'folder to write to; it is made if it does not exist, and files of the same names are '
     text += 'overwritten'
-    p.add_argument('--out', default='paper_figures', metavar='DIR', help=text)
+    p.add_argument('--out', type=path, default='paper_figures', metavar='DIR', help=text)
     p.add_argument(
         '--only',
         type=_list_of(PARTS),

@@ -8,7 +8,7 @@ import sys
 
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output
-from disc_sim_ros.cli.arguments import Parser
+from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import run_program
 
 
@@ -28,8 +28,10 @@ def parser(prog: str = 'repair_bag') -> Parser:
     )
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    p.add_argument('source', metavar='IN', help='folder of a bag, or an .mcap or .mcap.zstd file')
-    p.add_argument('target', metavar='OUT', help='folder to make; it must not exist')
+    p.add_argument(
+        'source', type=path, metavar='IN', help='folder of a bag, or an .mcap or .mcap.zstd file'
+    )
+    p.add_argument('target', type=path, metavar='OUT', help='folder to make; it must not exist')
     p.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'
     )

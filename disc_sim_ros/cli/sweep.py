@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import flags, output, study_flags
-from disc_sim_ros.cli.arguments import Parser, add_quantity, whole
+from disc_sim_ros.cli.arguments import Parser, add_quantity, path, whole
 from disc_sim_ros.cli.main import UsageError, run_program
 from disc_sim_ros.cli.progress import ProgressBar, duration
 from disc_sim_ros.cli.study_flags import listed
@@ -83,6 +83,7 @@ def parser(prog: str = 'sweep') -> Parser:
     )
     made.add_argument(
         '--output',
+        type=path,
         default=DEFAULT_OUTPUT,
         metavar='FILE',
         help='ends in .parquet (needs pyarrow) or .csv',
@@ -190,7 +191,7 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
     )
     if hasattr(chosen, 'step'):
         return study
-    step = good_step(setup, study.fastest_spin)
+    step = good_step(setup, study.fastest_spin, study.fastest_rate)
     return replace(study, setup=replace(setup, step=step))
 
 

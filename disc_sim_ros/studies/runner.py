@@ -78,9 +78,11 @@ def sweep(
 
         try:
             _Work(study, parts.missing(), parts.span, keep).fly(executor, threads, ahead)
-        except BaseException:
+        except BaseException as error:
             # Ctrl-C can come between the last part on disk and the line that counts it.
             parts.recount()
+            if isinstance(error, ConfigError) and not parts.flights_done:
+                parts.discard()  # the flights are refused: nothing is left on disk
             if progress is not None:
                 progress(parts.flights_done, study.size)
             raise

@@ -109,6 +109,10 @@ class Parts:
         """Count the complete parts on disk again, and remove incomplete ones."""
         self.done = self._complete_parts()
 
+    def discard(self) -> None:
+        """Remove the folder and all parts."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
     def join(self) -> None:
         """Join all parts into the output file, and remove them.
 

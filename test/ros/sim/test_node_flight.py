@@ -101,9 +101,9 @@ def test_the_flight_does_not_depend_on_the_clock(ros, request):
         (450, control_change(L=0.0, M=0.0, N=0.0)),
         (550, control_change(C_L=0.0)),
     ]
-    sim, states = resimulated(setup, SHORT.state(), 251, 5, changes)
+    sim, states = resimulated(setup, SHORT.state(), 401, 5, changes)
     count = math.ceil(sim.touch_time * 200.0) + 1  # the last one is on the ground
-    assert 200 < count < 251
+    assert 200 < count < 401
     for node in nodes:
         landing = node.wait_for_event('landed')
         assert float(landing['flight_time_s']) == sim.touch_time
