@@ -1,4 +1,4 @@
-"""The step that nobody gave suits every flight; a refused sweep leaves nothing."""
+"""A step that is not given suits every flight; a refused sweep leaves nothing."""
 
 import pytest
 
