@@ -62,3 +62,15 @@ def test_issue_templates_have_fields_with_labels(file):
     assert template['description']
     assert all(field['attributes']['label'] for field in fields)
     assert len({field['id'] for field in fields}) == len(fields) > 1
+
+
+def test_the_workflow_builds_each_distribution_that_the_page_names():
+    """Only read here: it runs where industrial_ci does."""
+    text = (ROOT / '.github/workflows/ros.yml').read_text(encoding='utf-8')
+    job = yaml.safe_load(text)['jobs']['industrial_ci']
+    page = (ROOT / 'docs/release.md').read_text(encoding='utf-8')
+    named = re.search(r'by industrial_ci on (\w+), (\w+) and (\w+)', page)
+    assert named is not None
+    assert job['strategy']['matrix']['ros_distro'] == [name.lower() for name in named.groups()]
+    assert job['env']['ROS_DISTRO'] == '${{ matrix.ros_distro }}'
+    assert any('industrial_ci' in step['uses'] for step in job['steps'])
