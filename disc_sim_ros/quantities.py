@@ -279,6 +279,38 @@ IMU = _table(
         'Constant error that is added to the angular velocity, in `disc_body`',
     ),
     Quantity(
+        'accelerometer_noise_density', 'm/s^2/sqrt(Hz)', 0.0, 1000.0, _ZEROS,
+        'Density of the white noise of the specific force, each axis, beside that of a sample',
+    ),
+    Quantity(
+        'accelerometer_bias_walk', 'm/s^2/sqrt(s)', 0.0, 1000.0, _ZEROS,
+        'Random walk of the bias of the specific force, each axis, from 0 at the throw',
+    ),
+    Quantity(
+        'accelerometer_range', 'm/s^2', 0.0, 1e6, _ZEROS,
+        'Greatest amount of the specific force that is read, each axis; 0: no limit',
+    ),
+    Quantity(
+        'accelerometer_bandwidth', 'Hz', 0.0, 1e6, 0.0,
+        'Cut-off of the low-pass filter of the specific force, first order; 0: no filter',
+    ),
+    Quantity(
+        'gyroscope_noise_density', 'rad/s/sqrt(Hz)', 0.0, 100.0, _ZEROS,
+        'Density of the white noise of the angular velocity, each axis, beside that of a sample',
+    ),
+    Quantity(
+        'gyroscope_bias_walk', 'rad/s/sqrt(s)', 0.0, 100.0, _ZEROS,
+        'Random walk of the bias of the angular velocity, each axis, from 0 at the throw',
+    ),
+    Quantity(
+        'gyroscope_range', 'rad/s', 0.0, 1e6, _ZEROS,
+        'Greatest amount of the angular velocity that is read, each axis; 0: no limit',
+    ),
+    Quantity(
+        'gyroscope_bandwidth', 'Hz', 0.0, 1e6, 0.0,
+        'Cut-off of the low-pass filter of the angular velocity, first order; 0: no filter',
+    ),
+    Quantity(
         'imu_seed', '', 0, LARGEST_SEED, 0,
         'Seed of the noise; the same seed gives the same noise', whole=True,
     ),

@@ -30,6 +30,14 @@ class ImuConfig:
     gyroscope_noise: float  # rad/s, standard deviation of a sample
     accelerometer_bias: tuple[float, ...]  # m/s^2, shape (3,)
     gyroscope_bias: tuple[float, ...]  # rad/s, shape (3,)
+    accelerometer_noise_density: tuple[float, ...]  # m/s^2/sqrt(Hz), shape (3,)
+    gyroscope_noise_density: tuple[float, ...]  # rad/s/sqrt(Hz), shape (3,)
+    accelerometer_bias_walk: tuple[float, ...]  # m/s^2/sqrt(s), shape (3,)
+    gyroscope_bias_walk: tuple[float, ...]  # rad/s/sqrt(s), shape (3,)
+    accelerometer_range: tuple[float, ...]  # m/s^2, shape (3,); 0 is no limit
+    gyroscope_range: tuple[float, ...]  # rad/s, shape (3,); 0 is no limit
+    accelerometer_bandwidth: float  # Hz; 0 is no filter
+    gyroscope_bandwidth: float  # Hz; 0 is no filter
     seed: int
 
 
@@ -72,6 +80,11 @@ class SimConfig:
     path_rate: float
     realtime_priority: int
     imu: ImuConfig
+
+    @property
+    def publish_period(self) -> float:
+        """Return the time from message to message of a state topic [s]."""
+        return self.steps_per_publish / self.physics_rate
 
 
 def configuration(values: Mapping[str, object]) -> SimConfig:

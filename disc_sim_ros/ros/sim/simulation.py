@@ -85,7 +85,7 @@ class Simulation:
         self._asked = False  # whether the sender is on use_sim_time
         self._sim: FlightSimulator | None = None
         self._resting = at_rest(config.launch.state())
-        self._imu_errors = ImuErrors(config.imu, 0)
+        self._imu_errors = ImuErrors(config.imu, 0, config.publish_period)
         self.flight = 0
         self._released = start  # later by the jumps of time since [ns]
         self._throw_at: float = start if config.auto_throw else math.inf
@@ -203,7 +203,7 @@ class Simulation:
             return
         sim.take(self.inputs.active.control)
         self._sim = sim
-        self._imu_errors = ImuErrors(config.imu, self.flight)
+        self._imu_errors = ImuErrors(config.imu, self.flight, config.publish_period)
         self.flight += 1
         self.counts.throws += 1
         self._released = self.clock.now
