@@ -10,9 +10,9 @@ from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.thrower import angles
 
-# As the authors state them (head of the file), read as standard deviations: of the speed [m/s], the
-# path, the roll, the nose and the heading [degrees], the spin [rad/s], and of the wind, along and
-# across [m/s].
+# As the authors state them (head of the file), read as standard deviations: of the speed [m/s],
+# the path, the roll, the nose and the heading [degrees], the spin [rad/s], and of the wind, along
+# and across [m/s].
 SPEED, PATH, ROLL, NOSE, YAW, SPIN, WIND = 0.6, 2.0, 5.0, 2.0, 2.0, 2.0, 1.0
 INSIDE_90 = -2.0 * math.log(0.1)  # greatest squared distance in the 90 % ellipse of a normal law
 
