@@ -58,7 +58,7 @@ def main() -> None:
 
 def lines(largest: float = 1e6) -> tuple[Line, ...]:
     """Measure up to `largest` flights, print tables and return the lines of the report."""
-    disc = disc_file.load_disc('frisbee')
+    disc = disc_file.load_disc('frisbee_as_printed')
     cores = os.cpu_count() or 1
     print(f'{cpu_name()}, {cores} cores; Python {platform.python_version()}, '
           f'numba {numba.__version__}, numpy {np.__version__}')  # fmt: skip

@@ -42,7 +42,9 @@ def main() -> None:
     """Print the measurements."""
     if os.environ.get('NUMBA_DISABLE_JIT') == '1':
         print(
-            time_per_flight(Setup(disc=disc_file.load_disc('frisbee'), step=STEPS[-1]), rounds=3)
+            time_per_flight(
+                Setup(disc=disc_file.load_disc('frisbee_as_printed'), step=STEPS[-1]), rounds=3
+            )
         )
         return
     print_lines(lines())
@@ -50,7 +52,7 @@ def main() -> None:
 
 def lines() -> tuple[Line, ...]:
     """Measure every step, print a table and return the lines of the report."""
-    disc = disc_file.load_disc('frisbee')
+    disc = disc_file.load_disc('frisbee_as_printed')
     landings = [landing_of_reference(launch) for launch in NEIGHBOURS]
     print(f'{cpu_name()}, {os.cpu_count()} cores; Python {platform.python_version()}, '
           f'numba {numba.__version__}, numpy {np.__version__}')  # fmt: skip

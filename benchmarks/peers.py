@@ -35,8 +35,8 @@ def rate(flight: Callable[[], Point], seconds: float) -> float:
 
 def ours(step: float, **inertia: float) -> Callable[[], Point]:
     """Return a flight of this package."""
-    document = disc_file.disc_document(disc_file.load_disc('frisbee')) | inertia
-    setup = Setup(disc=disc_file.disc_from_document('frisbee', document), step=step)
+    document = disc_file.disc_document(disc_file.load_disc('frisbee_as_printed')) | inertia
+    setup = Setup(disc=disc_file.disc_from_document('frisbee_as_printed', document), step=step)
     launch = Launch(speed=SPEED, spin=SPIN, height=HEIGHT)
 
     def flown() -> Point:
