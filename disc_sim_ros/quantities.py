@@ -34,7 +34,7 @@ LAUNCH = _table(
         'Sideslip: angle of the velocity right of the x axis, in the plane of the disc',
     ),
     Quantity(
-        'spin', 'rad/s', -1000.0, 1000.0, 31.416, 'Spin rate', 'clockwise from above positive'
+        'spin', 'rad/s', -1300.0, 1300.0, 31.416, 'Spin rate', 'clockwise from above positive'
     ),
     Quantity(
         'roll_rate', 'rad/s', -1000.0, 1000.0, 0.0,

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 import gc
-import os
 import re
 import sys
 import threading
@@ -23,9 +22,9 @@ from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
 from disc_sim_ros.ros.signals import exit_on_signal, on_signal
 
 LONGEST_WAIT = 0.5  # s until a signal takes effect
-LAST_DELIVERY = 0.5  # s for subscribers to get what was published last ...
-LAST_DELIVERY_UNDER_LOAD = 3.5  # ... where more than this many programs wait for each processor:
-HEAVY_LOAD = 4.0  # Fast DDS repeats what a subscriber lacks every 3 s
+LAST_DELIVERY = 0.2  # s for subscribers to get what was published last ...
+LAST_DELIVERY_UNDER_LOAD = 3.5  # ... on a machine that wakes sleepers later than this on average:
+LATE = 0.02  # s; Fast DDS repeats what a subscriber lacks every 3 s
 _FATAL, _UNSET = 50, 0  # log levels of rcl
 
 
@@ -141,12 +140,22 @@ def wait_for_subscribers(node: Node) -> None:
     A publisher that is destroyed takes along what was not delivered yet. On a machine under load
     that were up to 570 messages of a topic at 1 kHz, and a recorder cannot know of them.
     """
-    heavy = os.getloadavg()[0] > HEAVY_LOAD * (os.cpu_count() or 1)
-    end = time.monotonic() + (LAST_DELIVERY_UNDER_LOAD if heavy else LAST_DELIVERY)
+    if not any(publisher.get_subscription_count() for publisher in node.publishers):
+        return
+    end = time.monotonic() + (LAST_DELIVERY_UNDER_LOAD if _lateness() > LATE else LAST_DELIVERY)
     for publisher in node.publishers:
         left = max(end - time.monotonic(), 0.0)
         with suppress(RuntimeError):  # the middleware does not support it
             publisher.wait_for_all_acked(Duration(seconds=left))
+
+
+def _lateness() -> float:
+    """Return by how much this process wakes too late from a short sleep, on average [s]."""
+    naps, nap = 5, 0.005
+    start = time.monotonic()
+    for _ in range(naps):
+        time.sleep(nap)
+    return (time.monotonic() - start) / naps - nap
 
 
 def one_line(error: Exception) -> str:

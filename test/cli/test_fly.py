@@ -266,7 +266,7 @@ def test_help_states_the_unit_and_the_range_of_every_flag(fly):
         ('--yaw', 'DEG', 'from -360 to 360 degrees'),
         ('--alpha', 'DEG', 'from -180 to 180 degrees'),
         ('--sideslip', 'DEG', 'from -180 to 180 degrees'),
-        ('--spin', 'RAD/S', 'from -1000 to 1000 rad/s'),
+        ('--spin', 'RAD/S', 'from -1300 to 1300 rad/s'),
         ('--advance-ratio', 'R', 'from -100 to 100'),
         ('--roll-rate', 'RAD/S', 'from -1000 to 1000 rad/s'),
         ('--pitch-rate', 'RAD/S', 'from -1000 to 1000 rad/s'),

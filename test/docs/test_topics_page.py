@@ -130,6 +130,7 @@ def test_limits_are_those_of_the_code():
     assert f'up to {POSITION.highest / 1000:g} km' in taken[topics.THROW]
     assert f'up to {speed.highest:g} {speed.unit}' in taken[topics.THROW]
     assert f'up to {rate.highest:g} {rate.unit}' in taken[topics.THROW]
+    assert f'p, q up to {LAUNCH["roll_rate"].highest:g} {rate.unit}' in taken[topics.THROW]
 
 
 def test_numbers_in_the_text_are_those_of_the_code():

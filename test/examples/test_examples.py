@@ -146,8 +146,9 @@ def test_steer_turns_the_flight_as_the_physics_computes(ros):
     ]
     for end, control in zip(ends, (None, Control(0.001, 0.005, 0.002)), strict=True):
         flight = fly(Launch(), FRISBEE, control=control) if control else fly(Launch(), FRISBEE)
-        # The first command arrives about one step before or after the release.
-        assert end == pytest.approx(flight.position[:2], abs=0.02)
+        # Each millisecond by which the first command is late moves the landing by 5.4 mm; it
+        # arrives about one step before or after the release, on a busy machine 10 ms after it.
+        assert end == pytest.approx(flight.position[:2], abs=0.06)
     assert abs(ends[1][1] - ends[0][1]) > 1.0
 
 

@@ -63,7 +63,7 @@ def test_failed_tests_are_listed_last(tree):
     first = end.splitlines()[0]
     assert first.startswith('FAILED test/test_bad.py::test_bad')
     assert '::test_good' not in end
-    assert 'once more alone' not in done.stdout, 'so many failures are no accident'
+    assert 'again alone' not in done.stdout, 'so many failures are no accident'
 
 
 ONCE = """from pathlib import Path

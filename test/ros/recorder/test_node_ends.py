@@ -150,7 +150,7 @@ def test_a_simulator_that_ends_delivers_its_last_messages(ros, record):
     ros.spin_until(lambda: len(odom) > 50, 'a flight')
     recorder.process.send_signal(signal.SIGSTOP)
     sim.process.send_signal(signal.SIGINT)
-    time.sleep(0.3)
+    time.sleep(0.1)
     recorder.process.send_signal(signal.SIGCONT)
     assert sim.wait() == 0
     assert recorder.end() == 0
