@@ -293,7 +293,7 @@ def test_through_the_services_of_the_node(declared, new_node, ros_context):
     try:
         assert client.wait_for_services(10.0)
         (described,) = answer(client.describe_parameters(['launch.spin'])).descriptors
-        assert described.floating_point_range[0].to_value == 1000.0
+        assert described.floating_point_range[0].to_value == 1300.0
         assert 'Unit: rad/s.' in described.description
 
         numbers = change(launch__speed=20, imu__offset=[0, 0, 1])
