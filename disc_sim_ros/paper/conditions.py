@@ -1,8 +1,12 @@
 """Common parts of all figures: disc, model and launches of the paper, and sampled curves.
 
 The paper uses the constant-spin model unless its text says otherwise, and so do the figures. Each
-flight is computed with the printed roll and pitch damping and with a tenth of it, which agrees
-best with Fig. 5 (docs/deviations.md). Moment coefficients act in axes 3.
+flight is computed with the printed roll and pitch damping and with a tenth of it, with which the
+figures were drawn (docs/deviations.md). Moment coefficients act in axes 3.
+
+Two readings of printed launches are needed before the curves follow: the angle of attack "0" of
+Figs. 6c, d, 7 and 8 is that of no lift (`glide`), and the advance ratio "0.5" of Figs. 6e to h and
+9 is r c / V, half as much by eqn 63 (`ADV_R_PRINTED_AS_0_5`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,6 +31,7 @@ from disc_sim_ros.physics.trajectory import Trajectory
 MODEL = 'constant_spin'
 PRINTED, TENTH, HUNDREDTH = 1.0, 0.1, 0.01  # shares of the printed C_Lp and C_Mq
 SHARES = (PRINTED, TENTH)
+ADV_R_PRINTED_AS_0_5 = 0.25  # Figs. 6e to h and 9 print r c / V
 RATE = 100.0  # Hz, sample rate of the curves
 CONDITIONS = (
     'Constant-spin model, moments in axes 3 (body); roll and pitch damping as printed '
@@ -76,6 +81,28 @@ def spin_of(AdvR: float, speed: float) -> float:
 def level(AdvR: float, *, speed: float = 19.0, **angles: float) -> Launch:
     """Return a launch of Fig. 6: 19 m/s by default, each angle 0 unless given [degrees]."""
     return Launch(speed=speed, spin=spin_of(AdvR, speed), **{'pitch': 0.0, **angles})
+
+
+def crossing(alpha: FloatArray, values: FloatArray) -> float:
+    """Return the last angle at which values rise through zero, interpolated [degrees]."""
+    i = int(np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))[-1])
+    return float(alpha[i] - values[i] * (alpha[i + 1] - alpha[i]) / (values[i + 1] - values[i]))
+
+
+@cache
+def no_lift() -> float:
+    """Return the angle of attack at which the table of the paper's disc has no lift [degrees]."""
+    table = frisbee().table
+    if table is None:
+        raise ValueError('the disc frisbee_as_printed needs a table')
+    small = np.abs(table.alpha_deg) < 45.0
+    return crossing(table.alpha_deg[small], table.coefficients[small, 0])
+
+
+def glide(AdvR: float, *, path: float, speed: float = 19.0) -> Launch:
+    """Return a launch without lift along a path [degrees above the horizon] (Figs. 6c, 7, 8)."""
+    alpha = no_lift()
+    return level(AdvR, speed=speed, pitch=path + alpha, angle_of_attack=alpha)
 
 
 @cache

@@ -39,17 +39,11 @@ class Data:
 
     def zero(self, column: int) -> float:
         """Return the angle of attack at which a coefficient of the table is zero [degrees]."""
-        return crossing(self.alpha, self.table[:, column])
+        return conditions.crossing(self.alpha, self.table[:, column])
 
     def read_zero(self, name: str) -> float:
         """Return the angle of attack at which a coefficient of the symbols is zero [degrees]."""
-        return crossing(self.read['alpha_deg'], self.read[name])
-
-
-def crossing(alpha: FloatArray, values: FloatArray) -> float:
-    """Return the last angle at which values rise through zero, interpolated [degrees]."""
-    i = int(np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))[-1])
-    return float(alpha[i] - values[i] * (alpha[i + 1] - alpha[i]) / (values[i + 1] - values[i]))
+        return conditions.crossing(self.read['alpha_deg'], self.read[name])
 
 
 def compute() -> Data:

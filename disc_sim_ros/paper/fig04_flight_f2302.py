@@ -1,7 +1,7 @@
 """Fig. 4: Hummel's flight f2302, from the launch as printed and as corrected.
 
 The printed state treats Hummel's angles, which are of the sequence 1-2-3, as yaw, pitch and roll
-(docs/deviations.md). Her recording is not in this package: only the two launches are compared.
+(docs/deviations.md). The measured positions are the symbols of the figure, read off.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from disc_sim_ros.physics.launch import Launch
 TITLE = 'Fig. 4: flight f2302, launch as printed and as corrected'
 CONDITIONS = (
     conditions.CONDITIONS + " Paper's disc, table aerodynamics, flown to the ground.\n"
-    'Discs every 0.2 s at 10 % damping, enlarged 3 times.'
+    'Discs every 0.2 s at 10 % damping, enlarged 3 times. Circles: measured, read off the figure.'
 )
 
 RELEASE = (-0.90, -0.63, -0.91)  # X, Y, Z, m
@@ -38,10 +38,16 @@ FIRST_WOBBLE = 0.2  # s, time span in which it is measured
 
 @dataclass(frozen=True)
 class Data:
-    """The flights of both launches, each with both dampings."""
+    """The flights of both launches, each with both dampings, and the measured positions."""
 
     printed: tuple[Curve, ...]
     corrected: tuple[Curve, ...]
+    read: dict[str, FloatArray]
+
+    @property
+    def measured(self) -> FloatArray:
+        """Return the measured positions, X, Y, Z [m], shape (n, 3)."""
+        return np.column_stack([self.read[n] for n in ('X_forward_m', 'Y_right_m', 'Z_down_m')])
 
     @property
     def curves(self) -> tuple[Curve, ...]:
@@ -82,6 +88,7 @@ def compute() -> Data:
     return Data(
         flights('launch as printed', printed_launch()),
         flights('launch as corrected', corrected_launch()),
+        conditions.read('fig4_positions.csv'),
     )
 
 
@@ -89,6 +96,14 @@ def wobble(curve: Curve) -> float:
     """Return the amplitude of the angle of attack in the first 0.2 s [degrees]."""
     first = np.degrees(curve.t.alpha)[curve.t.t <= FIRST_WOBBLE]
     return float(np.ptp(first) / 2)
+
+
+def rms(curve: Curve, data: Data) -> float:
+    """Return the root mean square of the distances of a flight from the measured points [m]."""
+    start = (RELEASE[0], RELEASE[1], 0.0)  # the height is in the launch
+    path = curve.t.position + start
+    at = np.column_stack([np.interp(data.read['t_s'], curve.t.t, column) for column in path.T])
+    return float(np.sqrt(np.mean(np.sum((at - data.measured) ** 2, axis=1))))
 
 
 @style.styled
@@ -115,6 +130,9 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
             speed.plot(curve.t.t, curve.t.airspeed, **line)
             shown = curve.t.t <= 1.0
             alpha.plot(curve.t.t[shown], np.degrees(curve.t.alpha)[shown], **line)
+    for axis, which in ((top, style.TOP), (side, style.SIDE)):
+        circles = style.view(data.measured, which)
+        axis.plot(*circles.T, 'o', mfc='none', color=look.ink, ms=5, label='measured, read off')
     for axis, which, limits in (
         (top, style.TOP, (1.0, -3.6)),
         (side, style.SIDE, (-0.6, 2.6)),
@@ -143,6 +161,8 @@ def findings(data: Data) -> list[str]:
             f'{transverse:.2f} rad/s, spin {launch.spin:.2f} rad/s; angle of attack swings by '
             f'±{swing} in the first {FIRST_WOBBLE} s; lands after '
             + ', '.join(f'{c.flight.time:.2f} s' for c in curves)
+            + '; distance from the measured points rms '
+            + ', '.join(f'{rms(c, data):.2f} m' for c in curves)
             + '.'
         )
     return lines
@@ -150,7 +170,11 @@ def findings(data: Data) -> list[str]:
 
 def table(data: Data) -> str:
     """Return the samples as CSV; X and Y are relative to the release."""
-    return conditions.csv_of_curves(data.curves, {})
+    start = np.array((RELEASE[0], RELEASE[1], 0.0))
+    read = {'t_s': data.read['t_s']}
+    names = ('X_forward_m', 'Y_right_m', 'Z_down_m')
+    read |= dict(zip(names, (data.measured - start).T, strict=True))
+    return conditions.csv_of_curves(data.curves, {'measured, read off': read})
 
 
 def example(data: Data) -> Curve:

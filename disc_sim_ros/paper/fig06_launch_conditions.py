@@ -1,8 +1,7 @@
 """Fig. 6: side view and top view for several spins, pitches, angles of attack and rolls.
 
-The text gives V = 19 m/s and the advance ratios 1.1 for c and d and 0.5 for e and f; for g and h
-it says only that the advance ratio is less than in Fig. 5. The varied values are printed only in
-the legends of the figure; those here are chosen to span what the text discusses.
+The values are those that the legends print. Two readings (docs/deviations.md): in c and d the
+pitch is that of the path, released at the angle of no lift; in e to h "AdvR = 0.5" is r c / V.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,17 +19,21 @@ from disc_sim_ros.physics.launch import Launch
 
 TITLE = 'Fig. 6: effect of the launch, 19 m/s'
 CONDITIONS = (
-    'Constant-spin model, table aerodynamics, moments in axes 3 (body).\nSolid: damping as '
-    'printed, with discs every 0.4 s, enlarged 6 times; dotted: 10 % damping.'
+    'Constant-spin model, table aerodynamics, moments in axes 3 (body). Solid: 10 % damping, with '
+    'discs every 0.4 s, enlarged 6 times;\ndotted: damping as printed. c, d: released along a '
+    'path of pitch θ at the angle of no lift. e to h: the printed AdvR 0.5 is r c / V, 0.25 by '
+    'eqn 63.'
 )
-ADV_R_PITCH, ADV_R_ALPHA = 1.1, 0.5  # of panels c, d and e, f, from the text
-ADV_R_ROLL = 0.25  # not printed; the text says only less than in Fig. 5, 0.29
+ADV_R_PITCH = 1.1  # of panels c, d
+ADV_R = conditions.ADV_R_PRINTED_AS_0_5  # of panels e to h
 PITCH_ROLL = 20.0  # degrees, of panels g and h
 LONGEST = 4.0  # s, of launches that start level at Z = 0 and continue below
-RATIOS = (0.0, 0.1, 0.2, 0.4, 1.1, 3.2)
-PITCHES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0)
-ALPHAS = (0.0, 15.0, 30.0, 45.0, 60.0, 90.0)
-ROLLS = (-30.0, -20.0, -10.0, -7.0, 0.0, 10.0, 20.0, 30.0)
+RATIOS = (0.0, 0.1, 0.4, 1.0, 8.0)
+PITCHES = (0.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)
+ALPHAS = (0.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)
+ROLLS = (-20.0, -10.0, -5.0, 0.0, 5.0, 10.0, 20.0)
+STRETCHED = 3.0  # panel d: Y by X
+SHAPE = 0.72  # height of a panel by its width
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Panel:
 
     name: str
     curves: tuple[Curve, ...]
-    limits: tuple[float, float]  # of the height, m
+    corner: tuple[float, float]  # least height and leftmost Y of the views, m
+    width: float  # of the views, m
 
     def of(self, share: float) -> list[Curve]:
         """Return the flights with a share of the printed damping."""
@@ -59,16 +63,16 @@ def ratio_launch(ratio: float) -> Launch:
 
 
 def pitch_launch(pitch: float) -> Launch:
-    """Return a launch along the x axis of the disc at a pitch [degrees] (c, d)."""
-    return conditions.level(ADV_R_PITCH, pitch=pitch)
+    """Return a launch without lift along a path of a pitch [degrees] (c, d)."""
+    return conditions.glide(ADV_R_PITCH, path=pitch)
 
 
 def alpha_launch(alpha: float) -> Launch:
     """Return a launch of horizontal velocity at an angle of attack [degrees] (e, f)."""
-    return conditions.level(ADV_R_ALPHA, pitch=alpha, angle_of_attack=alpha)
+    return conditions.level(ADV_R, pitch=alpha, angle_of_attack=alpha)
 
 
-def roll_launch(roll: float, ratio: float = ADV_R_ROLL) -> Launch:
+def roll_launch(roll: float, ratio: float = ADV_R) -> Launch:
     """Return a launch at 20 degrees of pitch and a roll [degrees] (g, h)."""
     return conditions.level(ratio, pitch=PITCH_ROLL, roll=roll)
 
@@ -82,25 +86,26 @@ def compute() -> Data:
         values: Sequence[float],
         launch: Callable[[float], Launch],
         *,
-        limits: tuple[float, float],
+        corner: tuple[float, float],
+        width: float = 53.0,
         ground: bool,
     ) -> Panel:
         curves = []
         for share in conditions.SHARES:
             for value in values:
                 thrown = launch(value)
-                lands = ground and thrown.pitch > 0.0
+                lands = ground and thrown.pitch > thrown.angle_of_attack
                 longest = 60.0 if lands else LONGEST
                 flight = conditions.flown(thrown, share, duration=longest, ground=lands)
                 curves.append(Curve(f'{name} {value:g}{unit}', share, flight, value))
-        return Panel(name, tuple(curves), limits)
+        return Panel(name, tuple(curves), corner, width)
 
     return Data(
         (
-            panel('AdvR', '', RATIOS, ratio_launch, limits=(-14.0, 3.0), ground=False),
-            panel('θ', '°', PITCHES, pitch_launch, limits=(-5.0, 13.0), ground=True),
-            panel('α', '°', ALPHAS, alpha_launch, limits=(-10.0, 12.0), ground=False),
-            panel('φ', '°', ROLLS, roll_launch, limits=(0.0, 10.0), ground=True),
+            panel('AdvR', '', RATIOS, ratio_launch, corner=(-29.0, -14.0), ground=False),
+            panel('θ', '°', PITCHES, pitch_launch, corner=(-12.0, -6.0), ground=True),
+            panel('α', '°', ALPHAS, alpha_launch, corner=(-25.0, -25.0), ground=False),
+            panel('φ', '°', ROLLS, roll_launch, corner=(-10.0, -14.0), width=42.0, ground=True),
         )
     )
 
@@ -108,29 +113,38 @@ def compute() -> Data:
 @style.styled
 def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
     """Draw the eight panels: a row for each varied quantity."""
-    figure = style.sheet(10.8, TITLE, CONDITIONS)
-    grid = figure.add_gridspec(4, 2, height_ratios=(1, 0.75, 1, 1.3))
+    figure = style.sheet(15.0, TITLE, CONDITIONS)
+    grid = figure.add_gridspec(4, 2)
+    larger = f', Y drawn {STRETCHED:g} times larger'
     titles = (
-        'spin: AdvR from 0 to 3.2',
-        f'pitch, AdvR {ADV_R_PITCH:g}',
-        f'angle of attack, velocity level, AdvR {ADV_R_ALPHA:g}',
-        f'roll, pitch 20°, AdvR {ADV_R_ROLL:g} (assumed)',
+        'advance ratio',
+        f'pitch of the path, AdvR {ADV_R_PITCH:g}',
+        f'angle of attack, velocity level, AdvR {ADV_R:g}',
+        f'roll, pitch 20°, AdvR {ADV_R:g}',
     )
-    for row, (panel, title) in enumerate(zip(data.panels, titles, strict=True)):
-        solid = panel.of(conditions.PRINTED)
+    for row, (panel, varied) in enumerate(zip(data.panels, titles, strict=True)):
+        solid = panel.of(conditions.TENTH)
         colours = style.family([curve.value for curve in solid], look)
         for column, which in enumerate((style.SIDE, style.TOP)):
             axis = figure.add_subplot(grid[row, column])
+            narrow = which == style.TOP and panel is data.panels[1]
             for curve, dotted, colour in zip(
-                solid, panel.of(conditions.TENTH), colours, strict=True
+                solid, panel.of(conditions.PRINTED), colours, strict=True
             ):
                 style.path(axis, dotted.t, which, color=colour, ls=':', lw=1.4)
                 style.path(axis, curve.t, which, color=colour, label=curve.label)
-                style.discs(axis, curve.t, which, every=0.4, size=6.0, colour=colour)
-            style.views(axis, which, equal='box')
-            if which == style.SIDE:
-                axis.set_ylim(*panel.limits)
-            style.letter(axis, 'abcdefgh'[2 * row + column], title if column == 0 else '')
+                if not narrow:
+                    style.discs(axis, curve.t, which, every=0.4, size=6.0, colour=colour)
+            style.views(axis, which)
+            height = SHAPE * panel.width / (STRETCHED if narrow else 1.0)
+            low = panel.corner[column]
+            axis.set(xlim=(-3.0, panel.width - 3.0), ylim=(low, low + height))
+            axis.set_aspect(STRETCHED if narrow else 'equal', adjustable='box')
+            if which == style.TOP:
+                axis.yaxis.set_inverted(True)
+            above = f'from above{larger if narrow else ""}'
+            title = above if which == style.TOP else varied
+            style.letter(axis, 'abcdefgh'[2 * row + column], title)
             if column == 1:
                 axis.legend(loc='center left', bbox_to_anchor=(1.0, 0.5))
     return figure
@@ -142,9 +156,9 @@ def findings(data: Data) -> list[str]:
     for panel in data.panels:
         ends = (
             f'{curve.label} X {curve.flight.end.X:.1f}, Y {curve.flight.end.Y:+.1f} m'
-            for curve in panel.of(conditions.PRINTED)
+            for curve in panel.of(conditions.TENTH)
         )
-        lines.append('Ends, damping as printed: ' + '; '.join(ends) + '.')
+        lines.append('Ends, 10 % damping: ' + '; '.join(ends) + '.')
     return lines
 
 
@@ -169,7 +183,7 @@ def table(data: Data) -> str:
 
 def example(data: Data) -> Curve:
     """Return the flight to integrate a second time."""
-    return data.panels[0].of(conditions.PRINTED)[3]
+    return data.panels[0].of(conditions.TENTH)[2]
 
 
 FIGURE = PaperFigure(

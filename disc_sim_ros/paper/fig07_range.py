@@ -14,8 +14,11 @@ from disc_sim_ros.paper.fig06_launch_conditions import pitch_launch
 from disc_sim_ros.paper.figure_files import PaperFigure
 
 TITLE = 'Fig. 7: range over launch pitch, 19 m/s, AdvR 1.1'
-CONDITIONS = conditions.CONDITIONS + ' Landing where the centre crosses Z = 0.'
-COARSE = 10.0  # degrees; ten points from 0 to 90
+CONDITIONS = (
+    conditions.CONDITIONS + '\nLanding where the centre crosses Z = 0. The pitch is that of the '
+    'path; the disc is released at the angle of no lift.'
+)
+GRID = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)  # degrees, the paper's points
 FINE = 0.5  # degrees
 PAPER = 10.0  # degrees, pitch of the greatest range in the paper
 
@@ -25,7 +28,7 @@ class Data:
     """Flights to the ground for a range of pitches, with both dampings.
 
     Attributes:
-        pitch: Launch pitch [degrees], shape (n,).
+        pitch: Launch pitch of the path [degrees], shape (n,).
         range: Distance over the ground, a row for each of `conditions.SHARES` [m], shape (2, n).
         duration: Time of flight, likewise [s], shape (2, n).
         longest: One flight near the greatest range.
@@ -36,10 +39,14 @@ class Data:
     duration: FloatArray
     longest: Curve
 
-    def best(self, values: FloatArray, spacing: float = FINE) -> float:
-        """Return the pitch of the largest of `values`, on a grid with a spacing [degrees]."""
-        on_grid = np.flatnonzero(np.isclose(self.pitch % spacing, 0.0))
-        return float(self.pitch[on_grid[np.argmax(values[on_grid])]])
+    def best(self, values: FloatArray) -> float:
+        """Return the pitch of the largest of `values`, every half degree [degrees]."""
+        return float(self.pitch[np.argmax(values)])
+
+    def best_on_grid(self, values: FloatArray) -> float:
+        """Return the pitch of the largest of `values`, on the points of the paper [degrees]."""
+        points = np.flatnonzero(np.isin(self.pitch, GRID))
+        return float(self.pitch[points[np.argmax(values[points])]])
 
 
 def compute() -> Data:
@@ -49,15 +56,12 @@ def compute() -> Data:
         [conditions.flown(pitch_launch(float(x)), share, ground=True, rate=0.0) for x in pitch]
         for share in conditions.SHARES
     ]
+    longest = conditions.flown(pitch_launch(10.0), conditions.TENTH, ground=True)
     return Data(
         pitch,
         np.array([[flight.range for flight in row] for row in flights]),
         np.array([[flight.time for flight in row] for row in flights]),
-        Curve(
-            'θ 10°',
-            conditions.PRINTED,
-            conditions.flown(pitch_launch(10.0), conditions.PRINTED, ground=True),
-        ),
+        Curve('θ 10°', conditions.TENTH, longest),
     )
 
 
@@ -87,13 +91,13 @@ def draw(
         best = data.best(row)
         name = f'{conditions.percent(share)}: most at {best:g}°'
         axis.plot(data.pitch, row, label=name, **line)
-    coarse = np.isclose(data.pitch % COARSE, 0.0)
-    best = data.best(values[0], COARSE)
-    name = f'ten points, as printed: most at {best:g}°'
-    axis.plot(data.pitch[coarse], values[0][coarse], 'o', color=look.printed, label=name)
+    points = np.isin(data.pitch, GRID)
+    best = data.best_on_grid(values[1])
+    name = f"the paper's ten pitches, 10 % damping: most at {best:g}°"
+    axis.plot(data.pitch[points], values[1][points], 'o', color=look.tenth, label=name)
     name = f'paper: most near {stated:g}°'
     axis.axvline(stated, color=look.ink, ls=':', lw=1.4, label=name)
-    axis.set(xlabel='launch pitch θ, °', ylabel=label, xlim=(0, 90), ylim=(0, None))
+    axis.set(xlabel='launch pitch of the path θ, °', ylabel=label, xlim=(0, 90), ylim=(0, None))
     axis.legend(loc='best')
     return figure
 
@@ -102,9 +106,9 @@ def findings(data: Data) -> list[str]:
     """Return the pitch of the greatest range."""
     return [
         f'{conditions.percent(share)}: greatest range {row.max():.1f} m at {data.best(row):g}°; '
-        f'of ten points 10° apart at {data.best(row, COARSE):g}°.'
+        f"of the paper's ten pitches at {data.best_on_grid(row):g}°."
         for share, row in zip(conditions.SHARES, data.range, strict=True)
-    ] + ['At 0° the lift is less than the weight: the disc sinks at once and has no range.']
+    ] + ['At 0° there is no lift: the disc sinks at once and has no range.']
 
 
 def table(data: Data) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from disc_sim_ros.paper import conditions, fig07_range, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
 from disc_sim_ros.paper.fig06_launch_conditions import pitch_launch
-from disc_sim_ros.paper.fig07_range import COARSE, CONDITIONS, Data, compute, table
+from disc_sim_ros.paper.fig07_range import CONDITIONS, Data, compute, table
 from disc_sim_ros.paper.figure_files import PaperFigure
 
 TITLE = 'Fig. 8: duration over launch pitch, 19 m/s, AdvR 1.1'
@@ -31,7 +31,7 @@ def findings(data: Data) -> list[str]:
         at_paper = float(np.interp(PAPER, data.pitch, row))
         lines.append(
             f'{conditions.percent(share)}: greatest duration {row.max():.2f} s at '
-            f'{data.best(row):g}°; of ten points 10° apart at {data.best(row, COARSE):g}°. '
+            f"{data.best(row):g}°; of the paper's ten pitches at {data.best_on_grid(row):g}°. "
             f'At {PAPER:g}° it is {at_paper:.2f} s, {row.max() - at_paper:.2f} s less.'
         )
     return lines

@@ -9,17 +9,18 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.paper import conditions, figure_files, style
 from disc_sim_ros.paper.conditions import Curve
-from disc_sim_ros.paper.fig06_launch_conditions import ADV_R_ROLL, roll_launch
+from disc_sim_ros.paper.fig06_launch_conditions import ADV_R, roll_launch
 from disc_sim_ros.paper.figure_files import PaperFigure
 
 TITLE = 'Fig. 9: landing position over launch roll, 19 m/s, pitch 20°'
 CONDITIONS = (
     conditions.CONDITIONS
-    + '\nThe advance ratio is not printed; the text has it below 0.29, that of '
-    'Fig. 5, and uses 0.5 in panels 6e, f.'
+    + '\nThe panels print AdvR 0.5; read as r c / V it is 0.25 by eqn 63. The drawn landings '
+    'follow 0.24 to 0.25.'
 )
 ROLLS = np.arange(-30.0, 31.0)  # degrees
-RATIOS = (0.2, ADV_R_ROLL, 0.29, 0.5)
+GRID = (-30.0, -20.0, -10.0, -5.0, 0.0, 5.0, 10.0, 20.0, 30.0)  # degrees, the paper's points
+RATIOS = (0.24, ADV_R, 0.5)
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Data:
 
     Attributes:
         landing: X, Y of the landings [m], shape (RATIOS, conditions.SHARES, ROLLS, 2).
-        straight: The flight without roll at the assumed advance ratio.
+        straight: The flight without roll at AdvR 0.25.
     """
 
     landing: FloatArray
@@ -74,10 +75,10 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
     for axis, share in zip(panels, conditions.SHARES, strict=True):
         for ratio, colour in zip(RATIOS, colours, strict=True):
             X, Y = data.of(ratio, share).T
-            bold = ratio == ADV_R_ROLL
+            bold = ratio == ADV_R
             name = f'AdvR {ratio:g}: on the axis at {data.crossing(ratio, share):.1f}°'
             axis.plot(Y, X, color=colour, lw=2.6 if bold else 1.3, label=name)
-            every = slice(None, None, 10)
+            every = np.isin(ROLLS, GRID)
             axis.plot(Y[every], X[every], 'o', color=colour, ms=5.5 if bold else 3.5)
             if bold:
                 for roll, x, y in zip(ROLLS[every], X[every], Y[every], strict=True):
@@ -93,7 +94,7 @@ def plot(data: Data, look: style.Look = style.LIGHT) -> Figure:
 
 
 def steepest(roll: float) -> float:
-    """Return the largest angle of attack at the assumed AdvR and 10 % damping [degrees]."""
+    """Return the largest angle of attack at AdvR 0.25 and 10 % damping [degrees]."""
     flight = conditions.flown(roll_launch(roll), conditions.TENTH, ground=True)
     return float(np.degrees(flight.trajectory.alpha).max())
 
@@ -109,7 +110,7 @@ def findings(data: Data) -> list[str]:
     ]
     return [
         *lines,
-        f'The corner at AdvR {ADV_R_ROLL:g} and 10 % damping lies between rolls of -3° and -2°, '
+        f'The corner at AdvR {ADV_R:g} and 10 % damping lies between rolls of -3° and -2°, '
         f'where the largest angle of attack goes from {steepest(-3.0):.0f}° to '
         f'{steepest(-2.0):.0f}°: between 45° and 50° the table loses half of its lift.',
     ]

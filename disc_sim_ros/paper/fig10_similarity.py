@@ -1,11 +1,10 @@
 """Fig. 10: dimensionless trajectories of flat plates of equal k_n / AdvR coincide.
 
 The plate is `flat_plate` of the catalogue, for which the printed 0.06 m is the radius
-(docs/deviations.md). The paper does not print the speeds, masses and ratios of its curves.
+(docs/deviations.md). Speeds, masses, ratios and slopes are those of the legends.
 """
 
 from dataclasses import dataclass, replace
-import math
 import sys
 
 from matplotlib.figure import Figure
@@ -28,9 +27,8 @@ CONDITIONS = (
 SPEED, ALPHA = 15.7, 2.0  # m/s and degrees at launch
 GRAVITY = 9.81  # m/s^2
 LONGEST = 1.5  # dimensionless time t g / V
-MASS_FACTORS = (0.5, 1.0, 2.0, 4.0)  # first row; the speed grows with the root: lift = weight
-RATIOS = (0.5, 1.0, 2.0, 3.5)  # second row
-P_HAT_SECOND = 0.47  # second row, from the caption, by eqn 64 as printed
+FIRST = ((15.7, 0.015), (22.2, 0.03), (31.5, 0.06), (44.5, 0.12))  # m/s, kg: lift = weight
+SECOND = ((0.25, 0.1), (0.5, 0.2), (0.75, 0.3), (1.0, 0.4))  # AdvR, C_M slope per rad
 
 
 @dataclass(frozen=True)
@@ -41,12 +39,13 @@ class Data:
     second: tuple[Curve, ...]
 
 
-def plate(mass_factor: float = 1.0, CM_alpha: float | None = None) -> Disc:
-    """Return the flat plate with another mass or another moment slope."""
+def plate(mass: float | None = None, CM_alpha: float | None = None) -> Disc:
+    """Return the flat plate with another mass [kg] or another moment slope [1/rad]."""
     disc = disc_file.load_disc('flat_plate')
     if disc.linear is None:
         raise ValueError('the disc flat_plate needs lines')
     line = disc.linear if CM_alpha is None else replace(disc.linear, CM_alpha=CM_alpha)
+    mass_factor = 1.0 if mass is None else mass / disc.mass
     return replace(
         disc,
         mass=mass_factor * disc.mass,
@@ -71,31 +70,20 @@ def launched(disc: Disc, speed: float, ratio: float) -> Flight:
     )
 
 
-def moment_slope(ratio: float) -> float:
-    """Return the slope of C_M for which eqn 64 as printed gives `P_HAT_SECOND` [1/rad]."""
-    line = plate().linear
-    return P_HAT_SECOND / 8.0 * ratio * (line.CL_alpha if line else math.nan)
-
-
 def compute() -> Data:
     """Fly both rows."""
     first = tuple(
-        Curve(
-            f'{SPEED * math.sqrt(factor):.1f} m/s, {1e3 * 0.015 * factor:g} g',
-            0.0,
-            launched(plate(factor), SPEED * math.sqrt(factor), 1.0),
-            SPEED * math.sqrt(factor),
-        )
-        for factor in MASS_FACTORS
+        Curve(f'{speed:g} m/s, {1e3 * mass:g} g', 0.0, launched(plate(mass), speed, 1.0), speed)
+        for speed, mass in FIRST
     )
     second = tuple(
         Curve(
-            f'AdvR {ratio:g}, C_Mα {moment_slope(ratio):.3f}',
+            f'AdvR {ratio:g}, C_Mα {slope:g}',
             0.0,
-            launched(plate(CM_alpha=moment_slope(ratio)), SPEED, ratio),
+            launched(plate(CM_alpha=slope), SPEED, ratio),
             ratio,
         )
-        for ratio in RATIOS
+        for ratio, slope in SECOND
     )
     return Data(first, second)
 

@@ -42,7 +42,7 @@ TURN_LAUNCH = Launch(
     spin=conditions.spin_of(0.5, 13.5),
 )
 TURN_CONTROL = Control(C_L=0.1)
-TURN_DURATION = 6.0  # s; not printed
+TURN_DURATION = 7.0  # s
 SETTLED = (2.0, 4.0)  # s, time span of the mean values that the text states
 TURN_STATED = {'alpha_deg': 15.0, 'lambda_deg': 30.0, 'V_m_s': 7.0}
 

@@ -7,6 +7,7 @@ import platform
 
 from disc_sim_ros import __version__
 from disc_sim_ros.paper import figure_files
+from disc_sim_ros.paper.conditions import SHARES, percent
 from disc_sim_ros.paper.figure_files import WrittenFigure
 from disc_sim_ros.paper.statements import table
 from disc_sim_ros.paper.statements.rule import DIFFERS, NOT_REPRODUCIBLE, REPRODUCED, TAKEN, Result
@@ -21,11 +22,14 @@ INTRODUCTION = (
     'Moment coefficients act in axes 3 (zero-sideslip body axes) unless a figure says axes 4. The '
     'figures use the constant-spin model, as the paper does. Corrections of printed equations are '
     'listed in docs/deviations.md.',
-    'Launch values that the text does not give are chosen, and the figure says so. Verdicts are '
-    'computed: a number is reproduced if our number, with at least one of the two dampings, is '
-    'within half a unit of its last printed digit, or within the tolerance that the table states '
-    'with its reason; the table names the damping. Statements in words are read as bounds, which '
-    'the table states too.',
+    'Launches are those that the legends print, in two readings without which the curves do not '
+    'follow: "angle of attack 0" of Figs. 6c, d, 7 and 8 is the angle of no lift, with the '
+    'printed pitch as that of the path; and "AdvR 0.5" of Figs. 6e to h and 9 is r c / V, 0.25 by '
+    'eqn 63. '
+    'Verdicts are computed, for each damping by itself: a number is reproduced if ours is within '
+    'half a unit of its last printed digit, or within the tolerance that the table states with '
+    'its reason. Statements in words are read as bounds on one side, which the table marks: they '
+    'are weaker evidence.',
 )
 CHECK = (
     'One flight of each figure was integrated a second time in this run, with another formulation '
@@ -51,14 +55,14 @@ class Report:
         """Return the outcome, in sentences."""
         lines = []
         if self.results is not None:
-            counts = table.tally(self.results)
-            verdicts = ', '.join(f'{count} {verdict}' for verdict, count in counts.items())
-            total, printed, tenth = table.met_by_damping(self.results)
-            lines.append(f'Of {len(self.results)} statements with a number: {verdicts}.')
-            lines.append(
-                f'Damping has a part in {total} of them: as printed it meets {printed}, 10 % '
-                f'of it {tenth}.'
-            )
+            for share in reversed(SHARES):
+                counts = table.tally(self.results, share)
+                verdicts = ', '.join(f'{count} {verdict}' for verdict, count in counts.items())
+                total, met = table.bounds(self.results, share)
+                lines.append(
+                    f'Of {len(self.results)} statements, {percent(share)}: {verdicts}; {met} of '
+                    f'the reproduced are bounds on one side, of {total}.'
+                )
         if self.figures:
             worst = max(figure.distance for figure in self.figures)
             within = 'within' if worst < CLOSE else 'NOT within'
@@ -171,7 +175,8 @@ def _marked(results: Sequence[Result]) -> list[tuple[str, ...]]:
     rows = []
     for result in results:
         cells = list(table.cells(result))
-        cells[6] = f'{MARKS[result.verdict]} {cells[6]}'
+        for column, verdict in zip(table.VERDICT_COLUMNS, result.verdicts, strict=True):
+            cells[column] = f'{MARKS[verdict]} {verdict}'
         rows.append(tuple(cells))
     return rows
 

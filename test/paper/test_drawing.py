@@ -41,8 +41,11 @@ def test_paths_have_equal_scales_and_discs(key):
     figure = FIGURES[key].plot(computed(key), DARK)
     views = [axis for axis in figure.axes if 'X' in axis.get_xlabel() or key == '9']
     assert len(views) >= 2
-    assert all(axis.get_aspect() == 1.0 for axis in views)
-    assert key == '9' or all(axis.collections for axis in views)  # discs
+    stretched = [axis for axis in views if 'times larger' in axis.get_title('left')]
+    assert len(stretched) == (key == '6')  # panel d says by how much
+    assert all(axis.get_aspect() == (3.0 if axis in stretched else 1.0) for axis in views)
+    drawn = [axis for axis in views if axis not in stretched]
+    assert key == '9' or all(axis.collections for axis in drawn)  # discs
 
 
 def luminance(colour):

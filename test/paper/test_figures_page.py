@@ -17,6 +17,7 @@ from disc_sim_ros.paper import (
     style,
 )
 from disc_sim_ros.paper.conditions import PRINTED, TENTH
+from disc_sim_ros.paper.statements.rule import DIFFERS, REPRODUCED
 from paper.computed_figures import FIGURES, computed, judged
 
 pytestmark = pytest.mark.xdist_group('figures')  # computed once
@@ -45,14 +46,14 @@ def test_the_rows_hold_the_numbers_of_the_figures():
     assert f'{conditions.quantities(t)["alpha_deg"].max():.1f}°' in row('Fig. 5')
 
     flights = computed('7')
-    assert f'| {flights.best(flights.range[0]):g}°; of ten points 10° |' in row('Fig. 7')
-    assert f'| {flights.best(flights.duration[0]):g}°; of ten points 10° |' in row('Fig. 8')
-    assert flights.best(flights.duration[0], 10.0) == flights.best(flights.range[0], 10.0) == 10.0
+    for what, values in (('Fig. 7', flights.range[1]), ('Fig. 8', flights.duration[1])):
+        best, on_grid = flights.best(values), flights.best_on_grid(values)
+        assert f"| {best:g}°; of the paper's ten pitches {on_grid:g}° |" in row(what)
 
-    rolls = [computed('9').crossing(r, s) for r in (0.2, 0.25, 0.29) for s in conditions.SHARES]
-    assert f'{min(rolls):.1f} to {max(rolls):.1f}°' in row('Fig. 9')
+    roll = computed('9').crossing(conditions.ADV_R_PRINTED_AS_0_5, TENTH)
+    assert f'| {roll:.1f}° |' in row('Fig. 9')
     plates = computed('10')
-    assert max(fig10_similarity.spread(p) for p in (plates.first, plates.second)) < 0.002
+    assert max(fig10_similarity.spread(p) for p in (plates.first, plates.second)) < 0.003
 
     as_printed, tenth = computed('11').curves[:2]
     for curve in (as_printed, tenth):
@@ -64,9 +65,9 @@ def test_the_rows_hold_the_numbers_of_the_figures():
 
 def test_fig_5_is_reproduced_with_the_damping_of_the_page():
     results = [r for r in judged() if r.statement.says == 'rms of alpha from the black curve']
-    assert dict(zip(conditions.SHARES, results[0].met, strict=True)) == {
-        PRINTED: False,
-        TENTH: True,
+    assert dict(zip(conditions.SHARES, results[0].verdicts, strict=True)) == {
+        PRINTED: DIFFERS,
+        TENTH: REPRODUCED,
     }
 
 

@@ -6,25 +6,24 @@ import numpy as np
 
 from disc_sim_ros.paper import conditions, fig07_range, fig09_landing
 from disc_sim_ros.paper import fig06_launch_conditions as fig06
-from disc_sim_ros.paper.fig07_range import COARSE
 from disc_sim_ros.paper.statements.rule import Ours, Statement
 from disc_sim_ros.physics.flight import Flight
 
 pitches = cache(fig07_range.compute)
 landings = cache(fig09_landing.compute)
 
-ASSUMED = (0.2, 0.25, 0.29)  # AdvR of panels 6g, h: less than Fig. 5's 0.29
-_OPEN = 'AdvR is not printed, 0.2 to 0.29 assumed'
+LITERAL = 0.5  # AdvR as the panels 6e to h print it
 
 
 def _row(share: float) -> int:
     return conditions.SHARES.index(share)
 
 
-def _best(name: str, spacing: float) -> Ours:
+def _best(name: str, *, on_grid: bool) -> Ours:
     def best(share: float) -> float:
         data = pitches()
-        return data.best(getattr(data, name)[_row(share)], spacing)
+        values = getattr(data, name)[_row(share)]
+        return data.best_on_grid(values) if on_grid else data.best(values)
 
     return best
 
@@ -102,14 +101,23 @@ def _crossing(ratio: float) -> Ours:
     return lambda share: landings().crossing(ratio, share)
 
 
-def _over_ratios(quantity: str, *, most: bool) -> Ours:
-    """Return the least or the greatest value for the assumed advance ratios."""
+def _without_roll(ratio: float) -> Ours:
+    return lambda share: landings().without_roll(ratio, share)
 
-    def bound(share: float) -> float:
-        values: list[float] = [getattr(landings(), quantity)(ratio, share) for ratio in ASSUMED]
-        return max(values) if most else min(values)
 
-    return bound
+def _geometric_best(name: str) -> Ours:
+    """Return the best pitch if the disc were released along its own x axis [degrees]."""
+
+    def best(share: float) -> float:
+        def value(pitch: float) -> float:
+            launch = conditions.level(fig06.ADV_R_PITCH, pitch=pitch)
+            flight = conditions.flown(launch, share, ground=True, rate=0.0)
+            return float(getattr(flight, name))
+
+        pitches: list[float] = np.arange(5.0, 25.0, 0.5).tolist()
+        return max(pitches, key=value)
+
+    return best
 
 
 @cache
@@ -135,23 +143,29 @@ def _landing_side(roll: float) -> Ours:
 
 
 def _bends(share: float) -> float:
-    """Return the number of turning points of X along the landings, at rolls 10 degrees apart."""
-    X = landings().of(fig06.ADV_R_ROLL, share)[::10, 0]
+    """Return the number of turning points of X along the landings, at the rolls of the paper."""
+    points = np.isin(fig09_landing.ROLLS, fig09_landing.GRID)
+    X = landings().of(fig06.ADV_R, share)[points, 0]
     slope = np.sign(np.diff(X))
     return float(np.count_nonzero(slope[1:] != slope[:-1]))
 
 
-_COARSE = 'on ten points 10° apart 10° lasts longest; on a fine grid the maximum is at 13°'
+_FINE = (
+    'the curve is flat: on a fine grid the maximum is at 16°, on the points of the paper at 20°'
+)
+_GEOMETRIC = 'the figures follow with the angle of no lift'
+_STRAIGHT = 'strong damping holds the first roll back'
+_AXIS = '0.24, within the error of reading, gives -5.5° at 10 % damping'
 _LEVEL = 'Text on Fig. 6a, b'
 
 STATEMENTS = (
-    Statement(where=_LEVEL, says='AdvR 3.2: to the side in 4 s',
-              words='almost straight', number='<5', unit='% of the way', ours=_bend(3.2)),
+    Statement(where=_LEVEL, says='AdvR 8: to the side in 4 s',
+              words='almost straight', number='<5', unit='% of the way', ours=_bend(8.0)),
     Statement(where=_LEVEL, says='AdvR 0.4: to the right in 4 s',
               words='turns right', number='>5', unit='% of the way',
               ours=_bend(0.4), why='it turns right, but less'),
-    Statement(where=_LEVEL, says='AdvR 0.4 by 3.2: lower after 2 s by',
-              words='not much affected', number='<1', unit='m', ours=_depth_against(0.4, 3.2)),
+    Statement(where=_LEVEL, says='AdvR 0.4 by 1: lower after 2 s by',
+              words='not much affected', number='<1', unit='m', ours=_depth_against(0.4, 1.0)),
     Statement(where=_LEVEL, says='AdvR 0.1 by 0.4: lower after 2 s by',
               words='sinks faster', number='>1', unit='m', ours=_depth_against(0.1, 0.4)),
     Statement(where=_LEVEL, says='AdvR 0: least pitch in 1 s', words='nose down',
@@ -168,14 +182,18 @@ STATEMENTS = (
               ours=lambda share: fig06.least_returning_pitch(share, 10)),
     Statement(where='Text on Fig. 6d', says='landing to the side at AdvR 1.1, at most',
               words='little', number='<3', unit='m', ours=_sideways),
-    Statement(where='Text on Fig. 7', says='pitch of the greatest range, ten points', number='10',
-              unit='°', about=True, ours=_best('range', COARSE)),
+    Statement(where='Text on Fig. 7', says='pitch of the greatest range, paper\'s ten pitches',
+              number='10', unit='°', about=True, ours=_best('range', on_grid=True)),
     Statement(where='Text on Fig. 7', says='the same, every half degree', number='10', unit='°',
-              about=True, ours=_best('range', fig07_range.FINE)),
-    Statement(where='Text on Fig. 8', says='pitch of the longest duration, ten points',
-              number='20', unit='°', about=True, ours=_best('duration', COARSE), why=_COARSE),
+              about=True, ours=_best('range', on_grid=False)),
+    Statement(where='Text on Fig. 7', says='the same, released along the disc', number='10',
+              unit='°', about=True, ours=_geometric_best('range'), why=_GEOMETRIC),
+    Statement(where='Text on Fig. 8', says='pitch of the longest duration, paper\'s ten pitches',
+              number='20', unit='°', about=True, ours=_best('duration', on_grid=True)),
     Statement(where='Text on Fig. 8', says='the same, every half degree', number='20', unit='°',
-              about=True, ours=_best('duration', fig07_range.FINE), why=_COARSE),
+              about=True, ours=_best('duration', on_grid=False), why=_FINE),
+    Statement(where='Text on Fig. 8', says='the same, released along the disc', number='20',
+              unit='°', about=True, ours=_geometric_best('time'), why=_GEOMETRIC),
     Statement(where='Text on Figs. 7, 8', says='loss of range to 30° by that of duration',
               words='much more sensitive', number='>2',
               ours=_sensitivity),
@@ -184,21 +202,15 @@ STATEMENTS = (
     Statement(where='Text on Fig. 6e, f', says='alpha 90°: horizontal speed after 1 s, of 19',
               words='decelerates rapidly', number='<5', unit='m/s', ours=_speed_left_at_90),
     Statement(where='Text on Fig. 6g, h', says='roll of a straight first 2 s', number='-7',
-              unit='°', about=True, open_value=_OPEN,
-              ours=lambda share: min(_straightest(r, share) for r in ASSUMED),
-              upper=lambda share: max(_straightest(r, share) for r in ASSUMED),
-              why='the paths bend less here'),
+              unit='°', about=True, ours=lambda share: _straightest(fig06.ADV_R, share),
+              why=_STRAIGHT),
     Statement(where='Text on Fig. 9', says='landing to the right without roll', number='8',
-              unit='m', about=True, open_value=_OPEN,
-              ours=_over_ratios('without_roll', most=False),
-              upper=_over_ratios('without_roll', most=True)),
+              unit='m', about=True, ours=_without_roll(fig06.ADV_R), why=_STRAIGHT),
     Statement(where='Text on Fig. 9', says='roll of the landing nearest the X axis', number='-6',
-              unit='°', about=True, open_value=_OPEN,
-              ours=_over_ratios('crossing', most=False),
-              upper=_over_ratios('crossing', most=True)),
-    Statement(where='Text on Fig. 9', says='the same at AdvR 0.5, that of panels e, f',
-              number='-6', unit='°', about=True, ours=_crossing(0.5),
-              why='the text has these launches at less than 0.29, where it is met'),
+              unit='°', about=True, ours=_crossing(fig06.ADV_R), why=_AXIS),
+    Statement(where='Text on Fig. 9', says='the same at AdvR 0.5 by eqn 63', number='-6',
+              unit='°', about=True, ours=_crossing(LITERAL),
+              why='the printed 0.5 is r c / V, 0.25 by eqn 63'),
     Statement(where='Text on Fig. 9', says='roll -30°: lands at Y', words='left', number='<0',
               unit='m', ours=_landing_side(-30.0)),
     Statement(where='Text on Fig. 9', says='roll +30°: lands at Y', words='right', number='>0',

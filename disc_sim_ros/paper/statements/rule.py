@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from disc_sim_ros.paper.conditions import PRINTED, SHARES
+from disc_sim_ros.paper.conditions import PRINTED, SHARES, percent
 
 REPRODUCED = 'reproduced'
 DIFFERS = 'differs'
@@ -35,9 +35,6 @@ class Statement:
         reason: Reason for this tolerance.
         damped: True if the number depends on roll and pitch damping.
         taken: True if the number is an input of the simulator: agreement is then no evidence.
-        open_value: A launch value that the text does not give, and the assumed values; `ours` and
-            `upper` then return the bounds of the results for these values.
-        upper: See `open_value`.
         why: Why our number differs, or why there is none.
     """
 
@@ -52,9 +49,12 @@ class Statement:
     reason: str = ''
     damped: bool = True
     taken: bool = False
-    open_value: str = ''
-    upper: Ours | None = None
     why: str = ''
+
+    @property
+    def bound(self) -> bool:
+        """Return True if the number is a bound on one side, which is weaker evidence."""
+        return self.number[:1] in {'<', '>'}
 
     @property
     def value(self) -> float:
@@ -66,28 +66,25 @@ class Statement:
         """Return the allowed distance of our number from the printed one [unit]."""
         if self.tolerance is not None:
             return self.tolerance
-        return 0.0 if self.number[0] in '<>' else rounding(self.number, about=self.about)
+        return 0.0 if self.bound else rounding(self.number, about=self.about)
 
 
 @dataclass(frozen=True)
 class Result:
-    """A statement, our numbers and the verdict.
+    """A statement, our numbers and a verdict for each damping.
 
     Attributes:
         statement: The statement.
         ours: Our numbers, one for each of `conditions.SHARES`; a single one if damping has no
             influence; none if there is no computation.
-        verdict: One of the four verdicts.
-        detail: Difference and its cause, or the damping that reproduces the number.
-        met: For each of `conditions.SHARES`, True if it reproduces the number; empty if damping
-            has no influence or nothing was judged.
+        verdicts: One of the four verdicts for each of `conditions.SHARES`.
+        detail: How much our numbers differ with each damping, and the cause.
     """
 
     statement: Statement
     ours: tuple[str, ...]
-    verdict: str
+    verdicts: tuple[str, ...]
     detail: str
-    met: tuple[bool, ...] = ()
 
 
 def rounding(number: str, *, about: bool) -> float:
@@ -112,56 +109,43 @@ def rounding(number: str, *, about: bool) -> float:
 
 
 def judge(statement: Statement) -> Result:
-    """Compute our numbers and the verdict of a statement."""
+    """Compute our numbers and the verdicts of a statement, each damping by itself."""
     if statement.ours is None:
-        return Result(statement, (), NOT_REPRODUCIBLE, statement.why)
+        return Result(statement, (), (NOT_REPRODUCIBLE,) * len(SHARES), statement.why)
     shares = SHARES if statement.damped else (PRINTED,)
-    lower = [statement.ours(share) for share in shares]
-    if statement.upper is not None:
-        return _judge_open(statement, lower, [statement.upper(share) for share in shares])
-    shown = tuple(_shown(value) for value in lower)
+    numbers = [statement.ours(share) for share in shares]
+    shown = tuple(_shown(value) for value in numbers)
     if statement.taken:
-        return Result(statement, shown, TAKEN, statement.why or 'an input of this model')
-    off = [distance(statement, value) for value in lower]
+        why = statement.why or 'an input of this model'
+        return Result(statement, shown, (TAKEN,) * len(SHARES), why)
+    off = [distance(statement, value) for value in numbers]
     met = [value <= statement.allowed for value in off]
-    kept = tuple(met) if statement.damped else ()
+    verdicts = tuple(REPRODUCED if one else DIFFERS for one in met)
+    if not statement.damped:
+        verdicts *= len(SHARES)
     if all(met):
-        return Result(statement, shown, REPRODUCED, '', kept)
-    if any(met):
-        which = ('damping as printed', '10 % damping')[met.index(True)]
-        other = f'with {which}; off by {_amount(statement, max(off))} with the other'
-        return Result(statement, shown, REPRODUCED, other, kept)
-    detail = f'by {_amount(statement, min(off))}: {statement.why}'
-    return Result(statement, shown, DIFFERS, detail, kept)
+        return Result(statement, shown, verdicts, '')
+    if statement.damped:
+        amounts = ', '.join(
+            f'by {_amount(statement, value)} with {percent(share)}'
+            for share, value, one in zip(shares, off, met, strict=True)
+            if not one
+        )
+    else:
+        amounts = f'by {_amount(statement, off[0])}'
+    detail = f'{amounts}: {statement.why}' if statement.why else amounts
+    return Result(statement, shown, verdicts, detail)
 
 
 def distance(statement: Statement, ours: float) -> float:
     """Return the distance from the printed number, or beyond the bound [unit]."""
     if not math.isfinite(ours):
         return math.inf
-    if statement.number[0] == '>':
+    if statement.number[:1] == '>':
         return max(0.0, statement.value - ours)
     if statement.number[0] == '<':
         return max(0.0, ours - statement.value)
     return abs(ours - statement.value)
-
-
-def _judge_open(statement: Statement, lower: list[float], upper: list[float]) -> Result:
-    """Judge a statement about a launch that the text does not give completely."""
-    shown = tuple(
-        f'{_shown(min(a, b))} to {_shown(max(a, b))}' for a, b in zip(lower, upper, strict=True)
-    )
-    allowed = statement.allowed
-    within = any(
-        min(a, b) - allowed <= statement.value <= max(a, b) + allowed
-        for a, b in zip(lower, upper, strict=True)
-    )
-    if within:
-        detail = f'{statement.open_value}: what these give includes it'
-        return Result(statement, shown, NOT_REPRODUCIBLE, detail)
-    off = min(distance(statement, value) for value in lower + upper)
-    detail = f'by {_amount(statement, off)} at least, {statement.open_value}: {statement.why}'
-    return Result(statement, shown, DIFFERS, detail)
 
 
 def _shown(value: float) -> str:

@@ -21,28 +21,30 @@ STATEMENTS: tuple[Statement, ...] = (
     *control.STATEMENTS,
 )
 HEADER = ('where', 'what', 'paper', 'ours, damping as printed', 'ours, 10 % damping', 'tolerance',
-          'verdict', 'how much, why')  # fmt: skip
+          'verdict, damping as printed', 'verdict, 10 % damping', 'how much, why')  # fmt: skip
+VERDICT_COLUMNS = (6, 7)
 
 
 def evaluate() -> tuple[Result, ...]:
     """Judge all statements; the results hold no functions, so that they can be pickled."""
     results = (judge(statement) for statement in STATEMENTS)
     return tuple(
-        replace(result, statement=replace(result.statement, ours=None, upper=None))
-        for result in results
+        replace(result, statement=replace(result.statement, ours=None)) for result in results
     )
 
 
-def tally(results: tuple[Result, ...]) -> dict[str, int]:
-    """Return the number of statements with each verdict."""
+def tally(results: tuple[Result, ...], share: float) -> dict[str, int]:
+    """Return the number of statements with each verdict, with one of `conditions.SHARES`."""
+    row = conditions.SHARES.index(share)
     words = (REPRODUCED, DIFFERS, NOT_REPRODUCIBLE, TAKEN)
-    return {word: sum(result.verdict == word for result in results) for word in words}
+    return {word: sum(result.verdicts[row] == word for result in results) for word in words}
 
 
-def met_by_damping(results: tuple[Result, ...]) -> tuple[int, int, int]:
-    """Return the number of results that depend on damping, and how many each damping meets."""
-    judged = [result.met for result in results if result.met]
-    return len(judged), sum(met[0] for met in judged), sum(met[1] for met in judged)
+def bounds(results: tuple[Result, ...], share: float) -> tuple[int, int]:
+    """Return the number of one-sided bounds, and how many a damping reproduces."""
+    row = conditions.SHARES.index(share)
+    bounded = [result.verdicts[row] for result in results if result.statement.bound]
+    return len(bounded), bounded.count(REPRODUCED)
 
 
 def cells(result: Result) -> tuple[str, ...]:
@@ -56,7 +58,9 @@ def cells(result: Result) -> tuple[str, ...]:
     if len(ours) == 1:
         ours = (ours[0], 'the same')
     allowed = '-'
-    if result.ours and statement.number[0] not in '<>':
+    if statement.bound:
+        allowed = 'bound on one side'
+    elif result.ours:
         allowed = f'±{statement.allowed:.3g}'
         if statement.reason:
             allowed += f' ({statement.reason})'
@@ -66,7 +70,7 @@ def cells(result: Result) -> tuple[str, ...]:
         f'{about}{statement.number}{unit}'.strip() if statement.number else statement.words,
         *ours,
         allowed,
-        result.verdict,
+        *result.verdicts,
         result.detail,
     )
 

@@ -102,6 +102,16 @@ def _swing(launch: str) -> Ours:
     return swing
 
 
+def _rms_of_f2302(launch: str) -> Ours:
+    def distance(share: float) -> float:
+        data = fig04()
+        curves = data.printed if launch == 'printed' else data.corrected
+        return fig04_flight_f2302.rms(next(c for c in curves if c.share == share), data)
+
+    return distance
+
+
+_ONE_DISC = "the table is of the paper's disc, the throw of Hummel's"
 _TEXT4, _TEXT5, _DRAWN5 = 'Text on Fig. 4', 'Text on Fig. 5', 'Fig. 5, read off'
 _LINES = 'the printed lines do not give the grey curves; C_M = -0.023 + 0.38 alpha nearly would'
 _LONG = 'the axis of the drawing reads about 5 % long'
@@ -117,10 +127,13 @@ STATEMENTS = (
         ours=_swing('corrected'),
         why='Hummel\'s angles in their own sequence give half the transverse rate',
     ),
-    Statement(
-        where='Fig. 4, curves', says='trajectory of f2302', words='measured points', number='',
-        ours=None,
-        why='the recording and the points of the figure are not in this package',
+    *(
+        Statement(
+            where='Fig. 4, measured points', says=f'rms from the flight, launch as {name}',
+            number='0', unit='m', ours=_rms_of_f2302(name), tolerance=0.06,
+            reason='error of reading, three axes together', why=_ONE_DISC,
+        )
+        for name in ('printed', 'corrected')
     ),
     Statement(
         where='Fig. 5, caption', says='advance ratio at launch', number='0.29', damped=False,
