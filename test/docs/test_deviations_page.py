@@ -13,7 +13,7 @@ DEFAULT = 'test_errata.py'
 
 
 def names_of_tests(file: str) -> set[str]:
-    """Return the names of the tests in a file of test/physics, without the prefix."""
+    """Return the names of the tests in a file, from test/physics, without the prefix."""
     tree = ast.parse((TESTS / file).read_text(encoding='utf-8'))
     return {
         node.name.removeprefix('test_')
@@ -24,7 +24,7 @@ def names_of_tests(file: str) -> set[str]:
 
 def named_tests(text: str) -> list[tuple[str, str]]:
     """Return (file, test) for every test that a text names: an identifier with underscores."""
-    names = re.findall(r'`(?:(test_\w+\.py)`:\s+`)?([a-z]\w*_\w+)`', text)
+    names = re.findall(r'`(?:((?:\.\./paper/)?test_\w+\.py)`:\s+`)?([a-z]\w*_\w+)`', text)
     return [(file or DEFAULT, name) for file, name in names if name not in NOT_TESTS]
 
 
