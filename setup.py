@@ -93,7 +93,7 @@ setup(
         'Typing :: Typed',
     ],
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', 'physics/discs/*.yaml', 'paper/data/*']},
+    package_data={NAME: ['py.typed', 'physics/discs/*.yaml', 'paper/data/*', 'view/assets/*']},
     data_files=data_files(),
     distclass=DataDistribution,
     zip_safe=False,
@@ -120,6 +120,8 @@ setup(
         'fast': ['llvmlite>=0.43,<1', 'numba>=0.60,<1'],
         # Parquet tables of `sweep`.
         'parquet': ['pyarrow>=15,<30'],
+        # Pages with flights in 3D: `--html`, `--view`. Their viewer is no promise of trimesh.
+        'view': ['trimesh>=5,<6'],
         # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
         # `make docs`.

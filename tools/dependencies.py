@@ -26,12 +26,21 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[1]
 PAGE, LOCK = ROOT / 'docs' / 'dependencies.md', ROOT / 'requirements-dev.lock'
 BEGIN, END = '<!-- tables: tools/dependencies.py --write -->', '<!-- end of tables -->'
-EXTRAS = ('jazzy', 'fast', 'parquet', 'dask', 'test', 'docs')  # of the development environment
+EXTRAS = (
+    'jazzy',
+    'fast',
+    'parquet',
+    'view',
+    'dask',
+    'test',
+    'docs',
+)  # of the development environment
 DISTRIBUTED = (
     '',
     'jazzy',
     'fast',
     'parquet',
+    'view',
     'dask',
 )  # what users run; the other extras are tools
 RENEW = 'run `make lock`, then `make test`'
@@ -66,6 +75,7 @@ WHY = {
     'ruff': 'linter and formatter',
     'scipy': 'fits, optimisation and integration in analyses',
     'Sphinx': 'builds the documentation site',
+    'trimesh': 'the viewer of pages with flights, with three.js in it',
     'types-PyYAML': 'types of PyYAML for mypy',
     'zstandard': 'bags with zstd chunks',
 }

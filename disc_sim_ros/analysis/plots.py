@@ -11,6 +11,7 @@ import numpy as np
 from disc_sim_ros import topics
 from disc_sim_ros.analysis.flight_report import columns
 from disc_sim_ros.errors import printable
+from disc_sim_ros.palette import COLOURS
 
 if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly` does without
     from collections.abc import Sequence
@@ -21,8 +22,6 @@ if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly`
     from disc_sim_ros.analysis.recording import Change
     from disc_sim_ros.physics.flight import Flight
 
-# Okabe and Ito: safe for colour-blind readers.
-COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#000000')
 BLUE, ORANGE = COLOURS[:2]
 _HISTORIES = (
     ('airspeed_m_s', 'airspeed, m/s'),

@@ -9,12 +9,13 @@ import sys
 import time
 
 from disc_sim_ros import __version__, files
-from disc_sim_ros.cli import flags, output
+from disc_sim_ros.cli import flags, output, pages
 from disc_sim_ros.cli.arguments import Parser, add_quantity, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.trajectory import Trajectory
 from disc_sim_ros.quantities import SAMPLE_RATE
 
 STDOUT = '-'  # as the name of a file
@@ -59,6 +60,7 @@ def parser(prog: str = 'fly') -> Parser:
         'speedMph or speedKmh, spinRpm, launchAngle, noseAngle, hyzerAngle, and, if there, '
         'wobbleAngle and throwType',
     )
+    pages.add_page(shown)
     shape = shown.add_mutually_exclusive_group()
     shape.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'
@@ -96,6 +98,22 @@ def _in_flags(error: ConfigError, chosen: argparse.Namespace, parser: Parser) ->
 
 
 def _run(chosen: argparse.Namespace) -> int:
+    several = hasattr(chosen, 'techdisc') or len(getattr(chosen, 'discs', ())) > 1
+    report = _compare if several or chosen.units != 'metric' else _report
+    flown = report(chosen)
+    if not pages.is_wanted(chosen):
+        return 0
+    # After the numbers: they come even if the page cannot be written.
+    line = _write_page(chosen, flown)
+    if chosen.json or getattr(chosen, 'csv', None) == STDOUT:
+        output.note(chosen.prog, line)
+    else:
+        output.show(line if several or chosen.units != 'metric' else f'  {line}')
+    return 0
+
+
+def _report(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
+    """Fly one disc and show its flight."""
     csv, plot, bag = (getattr(chosen, name, None) for name in ('csv', 'plot', 'bag'))
     if csv not in {None, STDOUT}:
         output.check_writable('--csv', csv)
@@ -103,23 +121,24 @@ def _run(chosen: argparse.Namespace) -> int:
         output.check_plot(plot)
     in_file = csv is not None or plot is not None
     rate = getattr(chosen, 'samples', DEFAULT_RATE if in_file else 0.0)
-    several = hasattr(chosen, 'techdisc') or len(getattr(chosen, 'discs', ())) > 1
-    if several or chosen.units != 'metric':
-        return _compare(chosen, plot)
+    sampled = rate if bag is None else 0.0
+    if pages.is_wanted(chosen):
+        sampled = sampled or pages.RATE
     release, setup = flags.thrown(chosen)
     write = None if bag is None else _bag_writer(chosen, bag, release, setup)
 
-    flown = _fly(chosen, release, setup, 0.0 if bag is not None else rate)
+    flown = _fly(chosen, release, setup, sampled)
+    names = {flown.setup.disc.name: flown}
     from disc_sim_ros.analysis import flight_report  # noqa: PLC0415 - not before it is needed
 
     if chosen.json:
-        document = flight_report.document(flown)
+        document = flight_report.document(flown if rate else _without_samples(flown))
         document['launch']['disc'] = chosen.disc  # of a file its path, so that it can fly again
         output.show(json.dumps(document, allow_nan=False))
-        return 0
+        return names
     if csv == STDOUT:
         output.show(flight_report.csv_text(flown.trajectory).rstrip('\n'))
-        return 0
+        return names
     lines = [flight_report.summary(flown)]
     if csv is not None:
         output.write_whole('--csv', csv, flight_report.csv_text(flown.trajectory).encode())
@@ -134,10 +153,10 @@ def _run(chosen: argparse.Namespace) -> int:
     elif rate > 0.0:
         lines.append(flight_report.samples_text(flown.trajectory))
     output.show('\n'.join(lines))
-    return 0
+    return names
 
 
-def _compare(chosen: argparse.Namespace, plot: str | None) -> int:
+def _compare(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     """Fly each disc, with each throw of `--techdisc`, and show them side by side."""
     for name in ('csv', 'bag'):
         if hasattr(chosen, name):
@@ -145,7 +164,9 @@ def _compare(chosen: argparse.Namespace, plot: str | None) -> int:
             raise ConfigError(f'--{name}', getattr(chosen, name), allowed)
     from disc_sim_ros.analysis import comparison, flight_report, techdisc  # noqa: PLC0415
 
-    rate = getattr(chosen, 'samples', DEFAULT_RATE if plot is not None else 0.0)
+    plot = getattr(chosen, 'plot', None)
+    default = pages.RATE if pages.is_wanted(chosen) else DEFAULT_RATE if plot is not None else 0.0
+    rate = getattr(chosen, 'samples', default)
     throws = techdisc.throws(chosen.techdisc) if hasattr(chosen, 'techdisc') else []
     discs = getattr(chosen, 'discs', [chosen.disc])
     flown: dict[str, flight.Flight] = {}
@@ -160,9 +181,13 @@ def _compare(chosen: argparse.Namespace, plot: str | None) -> int:
             flown[name] = _fly(chosen, launch, setup, rate)
     names, flights = list(flown), list(flown.values())
     if chosen.json:
-        documents = [{'name': n, **flight_report.document(f)} for n, f in flown.items()]
+        bare = not hasattr(chosen, 'samples')  # those of a page are not printed
+        documents = [
+            {'name': n, **flight_report.document(_without_samples(f) if bare else f)}
+            for n, f in flown.items()
+        ]
         output.show(json.dumps({'flights': documents}, allow_nan=False))
-        return 0
+        return flown
     lines = [comparison.table(names, flights, chosen.units)]
     if plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
@@ -170,7 +195,21 @@ def _compare(chosen: argparse.Namespace, plot: str | None) -> int:
         output.write_plot(plot, plots.comparison_figure(flights, names))
         lines.append(f'wrote {plot}')
     output.show('\n'.join(lines))
-    return 0
+    return flown
+
+
+def _without_samples(flown: flight.Flight) -> flight.Flight:
+    """Return a flight whose samples were for the page only."""
+    trajectory = flown.trajectory
+    return replace(flown, trajectory=Trajectory(trajectory.rows[:0], trajectory.diameter))
+
+
+def _write_page(chosen: argparse.Namespace, flown: dict[str, flight.Flight]) -> str:
+    from disc_sim_ros.view import shown  # noqa: PLC0415 - only with --html or --view
+
+    system = shown.SYSTEMS[chosen.units]
+    flights = [shown.of_flight(f, name, system) for name, f in flown.items()]
+    return pages.write(chosen, flights, f'Flight of {", ".join(flown)}', chosen.units)
 
 
 def _fly(

@@ -31,7 +31,7 @@ KEYS |= {
         'numpy',
         'scipy',
     )
-} | {'PIL': 'python3-pil'}
+} | {'PIL': 'python3-pil', 'trimesh': 'python3-trimesh-pip'}
 # rosdep has no keys for the others that mcap-ros2-support brings along.
 KEYS |= dict.fromkeys(('mcap', 'mcap_ros2', 'lz4', 'zstandard'), 'mcap-ros2-support')
 # Not in rosdep, or not in Ubuntu 24.04; or part of newer distributions only.

@@ -1,0 +1,94 @@
+"""The page: the viewer of trimesh with three.js, our controls, and the flights, in one file."""
+
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+import json
+from typing import Any
+
+from disc_sim_ros.errors import DiscSimError, printable
+from disc_sim_ros.palette import COLOURS
+from disc_sim_ros.view.shown import ShownFlight, System, curve_labels, document
+
+TRIMESH = (5, 6)  # from and below: the page uses names of its viewer that are not promised
+# Forbids every request: the page works from a file, and nothing in it can ask a host.
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    'img-src data: blob:; connect-src data: blob:'
+)
+_BLACK = {'#000000': '#808080'}  # which a dark page would hide
+_SCRIPTS = ('pose.js', 'scene.js', 'camera.js', 'curves.js', 'controls.js')
+
+
+class ViewerMissingError(DiscSimError):
+    """The package trimesh is missing, or is a version with another viewer."""
+
+
+def page(flights: Sequence[ShownFlight], title: str, system: System) -> bytes:
+    """Return a page of flights as the bytes of an HTML file that needs no other file.
+
+    Args:
+        flights: The flights, at least one; they start together at time 0.
+        title: Heading of the page.
+        system: Units of all that people read.
+
+    Raises:
+        ViewerMissingError: trimesh is missing or has the wrong version.
+        ValueError: There are no flights.
+    """
+    if not flights:
+        raise ValueError('a page needs at least one flight')
+    values = {
+        'title': title,
+        'units': {'length': system.length, 'speed': system.speed},
+        'metresPerLength': 1.0 / system.lengths(1.0),
+        'metresPerSecondPerSpeed': 1.0 / system.speeds(1.0),
+        'colours': [_BLACK.get(colour, colour) for colour in COLOURS],
+        'labels': [list(label) for label in curve_labels(system)],
+        'tracks': [document(flight, system) for flight in flights],
+    }
+    return assembled(viewer(), title, values).encode()
+
+
+def viewer() -> str:
+    """Return the page of trimesh with its three.js and the shape of a disc of diameter 1.
+
+    Raises:
+        ViewerMissingError: trimesh is missing or has the wrong version.
+    """
+    wanted = f'trimesh {TRIMESH[0]} (pip install "trimesh>={TRIMESH[0]},<{TRIMESH[1]}")'
+    try:
+        import trimesh  # noqa: PLC0415 - optional
+        from trimesh.viewer.notebook import scene_to_html  # noqa: PLC0415
+
+        from disc_sim_ros.view import shape  # noqa: PLC0415 - imports trimesh
+    except ImportError as error:
+        raise ViewerMissingError(f'a page needs {wanted}: {error}') from None
+    if not TRIMESH[0] <= int(str(trimesh.__version__).partition('.')[0]) < TRIMESH[1]:
+        raise ViewerMissingError(f'a page needs {wanted}, not {trimesh.__version__}')
+    return str(scene_to_html(shape.scene()))
+
+
+def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
+    """Return the page of trimesh with our style, controls, data and scripts in it."""
+    data = json.dumps(values, allow_nan=False, separators=(',', ':')).replace('<', '\\u003c')
+    head = (
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
+        f'<title>{escape(printable(title))}</title><style>{_asset("page.css")}</style></head>'
+    )
+    scripts = '\n'.join(_asset(name) for name in _SCRIPTS)
+    body = (
+        f'{_asset("page.html")}<script type="application/json" id="flights">{data}</script>'
+        f"<script>(() => {{'use strict';\n{scripts}\n}})();</script></body>"
+    )
+    start, _, rest = viewer_page.partition('<title>')
+    _, title_end, rest = rest.partition('</title>')
+    if not title_end or rest.count('</head>') != 1 or not rest.count('</body>'):
+        raise ViewerMissingError('the page of trimesh has another form than expected')
+    rest = rest.replace('</head>', head, 1)
+    before, _, after = rest.rpartition('</body>')
+    return before.join((start, body)) + after
+
+
+def _asset(name: str) -> str:
+    return (resources.files(__package__) / 'assets' / name).read_text(encoding='utf-8')

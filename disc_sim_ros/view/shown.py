@@ -1,0 +1,152 @@
+"""A flight as a page shows it: poses, wind and curves over the time."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.flight import Flight
+from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.units import UNITS
+
+MOST_SAMPLES = 6000  # of one flight in a page; longer ones are thinned out evenly
+# Digits behind the point: 0.1 mm, 1e-5 of a radian. They keep the page small.
+_PLACES = {'t': 4, 'position': 4, 'attitude': 6, 'spin': 4, 'wind': 3, 'curve': 4}
+
+
+@dataclass(frozen=True)
+class System:
+    """A system of units for people, by the names of `units.UNITS`.
+
+    Attributes:
+        length: Unit of heights and distances.
+        speed: Unit of speeds.
+        spin: Unit of spin rates.
+    """
+
+    length: str
+    speed: str
+    spin: str
+
+    def lengths(self, values: Any) -> Any:
+        """Return lengths [m] in this system."""
+        return values / UNITS['m'][self.length]
+
+    def speeds(self, values: Any) -> Any:
+        """Return speeds [m/s] in this system."""
+        return values / UNITS['m/s'][self.speed]
+
+    def spins(self, values: Any) -> Any:
+        """Return rates [rad/s] in this system."""
+        return values / UNITS['rad/s'][self.spin]
+
+
+SYSTEMS = {'metric': System('m', 'm/s', 'rad/s'), 'us': System('ft', 'mph', 'rpm')}
+
+
+@dataclass(frozen=True, eq=False)
+class ShownFlight:
+    """One flight of one disc.
+
+    Attributes:
+        name: What the page calls it.
+        result: One line on how it ended; '' for none.
+        trajectory: The motion, in the paper's axes, at least one sample.
+        landed: True if the last sample is on the ground.
+        wind_is_known: False where the wind in the trajectory is not that of the flight.
+    """
+
+    name: str
+    result: str
+    trajectory: Trajectory
+    landed: bool = True
+    wind_is_known: bool = True
+
+
+def of_flight(flight: Flight, name: str, system: System) -> ShownFlight:
+    """Return a simulated flight with its end as the last sample.
+
+    Args:
+        flight: A flight with samples.
+        name: What the page calls it.
+        system: Units of the text.
+
+    Raises:
+        ValueError: The flight has no samples.
+    """
+    rows = flight.trajectory.rows
+    if not len(rows):
+        raise ValueError('the flight has no samples: fly it with a sample rate')
+    if flight.time > rows[-1, 0]:
+        rows = np.vstack([rows, [flight.time, *flight.end, *rows[-1, 15:]]])
+    ended = 'landed' if flight.landed else 'in the air'
+    side = 'left' if flight.drift >= 0.0 else 'right'
+    result = (
+        f'{ended} after {flight.time:.2f} s, '
+        f'range {system.lengths(flight.range):.1f} {system.length}, '
+        f'{abs(system.lengths(flight.drift)):.1f} {system.length} to the {side}'
+    )
+    trajectory = Trajectory(rows, flight.trajectory.diameter)
+    return ShownFlight(name, result, trajectory, flight.landed)
+
+
+def thinned(trajectory: Trajectory, most: int = MOST_SAMPLES) -> Trajectory:
+    """Return at most `most` samples, evenly spread, with the first and the last."""
+    n = len(trajectory)
+    if n <= most:
+        return trajectory
+    chosen = np.unique(np.linspace(0, n - 1, most).round().astype(int))
+    return Trajectory(trajectory.rows[chosen], trajectory.diameter)
+
+
+def curve_labels(system: System) -> list[tuple[str, str]]:
+    """Return the names and units of the curves below the picture, in the order of `document`."""
+    return [
+        ('height', system.length),
+        ('airspeed', system.speed),
+        ('angle of attack', '°'),
+        ('spin', system.spin),
+        ('pitch', '°'),
+        ('roll', '°'),
+    ]
+
+
+def document(flight: ShownFlight, system: System) -> dict[str, Any]:
+    """Return a flight as values that JSON knows.
+
+    Positions [m] and quaternions x, y, z, w are those of `disc` in `map`, one after the other in
+    flat lists. `spin` is the angle of `disc_body` in `disc` about z up [rad], not reduced to one
+    turn, so that a page can interpolate it for any spin rate. Curves are in units of `system`;
+    null where a value does not exist.
+    """
+    t = thinned(flight.trajectory)
+    up = frames.map_from_paper(t.position)
+    wind = frames.map_from_paper(t.wind)
+    euler = np.degrees(np.unwrap(t.euler, axis=0))
+    curves = (
+        system.lengths(up[:, 2]),
+        system.speeds(t.airspeed),
+        np.degrees(t.alpha),
+        system.spins(t.spin),
+        euler[:, 1],
+        euler[:, 0],
+    )
+    return {
+        'name': flight.name,
+        'result': flight.result,
+        'diameter': t.diameter,
+        'landed': flight.landed,
+        't': _plain(t.t - t.t[0], 't'),
+        'position': _plain(up, 'position'),
+        'attitude': _plain(frames.message_quaternion(t.attitude), 'attitude'),
+        'spin': _plain(-np.asarray(t.spin_angle), 'spin'),
+        'wind': _plain(wind, 'wind') if flight.wind_is_known and np.any(wind != 0.0) else None,
+        'curves': [_plain(curve, 'curve') for curve in curves],
+    }
+
+
+def _plain(values: FloatArray, kind: str) -> list[float | None]:
+    rounded = np.round(values, _PLACES[kind]).ravel() + 0.0
+    return [x if np.isfinite(x) else None for x in rounded.tolist()]

@@ -1,0 +1,219 @@
+"""A Chromium without a window, driven through its pipe: for tests and recordings of pages.
+
+The messages are those of the Chrome DevTools Protocol, JSON ended by a zero byte, on the file
+descriptors 3 and 4 of the browser (`--remote-debugging-pipe`).
+"""
+
+import base64
+from contextlib import suppress
+import json
+import os
+from pathlib import Path
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from typing import Any, Self
+
+PROGRAMS = ('chromium', 'chromium-browser', 'google-chrome')
+MISSING = 'no Chromium (on Debian: apt install chromium)'
+_FLAGS = (
+    '--headless=new', '--no-sandbox', '--no-first-run', '--disable-background-networking',
+    '--disable-component-update', '--disable-sync', '--disable-quic', '--disable-dev-shm-usage',
+    '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+    '--hide-scrollbars', '--remote-debugging-pipe',
+)  # fmt: skip
+_DEADLINE = 60.0  # s for an answer
+
+
+def program() -> str | None:
+    """Return the path of a Chromium, or None; the environment variable CHROMIUM names another."""
+    names = (os.environ.get('CHROMIUM', ''), *PROGRAMS)
+    return next((path for name in names if name and (path := shutil.which(name))), None)
+
+
+class BrowserError(Exception):
+    """The browser ended, gave no answer in time, or refused a command."""
+
+
+class Browser:
+    """One page in a Chromium without a window.
+
+    Attributes:
+        problems: Errors and warnings of the console, exceptions and failed requests, since the
+            start.
+        requests: Addresses that pages have asked for.
+    """
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        *,
+        phone: bool = False,
+        dark: bool = False,
+    ) -> None:
+        path = program()
+        if path is None:
+            raise BrowserError(MISSING)
+        self.problems: list[str] = []
+        self.requests: list[str] = []
+        self._number = 0
+        self._rest = b''
+        self._events: list[dict[str, Any]] = []
+        self._folder = tempfile.mkdtemp(prefix='browser_')
+        to_read, self._to = os.pipe()
+        self._from, to_write = os.pipe()
+        command = 'exec "$@" 3<&"$IN" 4>&"$OUT"'
+        self._process = subprocess.Popen(  # noqa: S603 - a fixed command
+            [
+                '/bin/bash', '-c', command, 'sh', path, *_FLAGS,
+                f'--user-data-dir={self._folder}', f'--window-size={width},{height}',
+                'about:blank',
+            ],
+            pass_fds=(to_read, to_write),
+            env={**os.environ, 'IN': str(to_read), 'OUT': str(to_write)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+        os.close(to_read)
+        os.close(to_write)
+        os.set_blocking(self._from, False)
+        self._session = ''
+        try:
+            self._attach(width, height, phone=phone, dark=dark)
+        except BaseException:
+            self.close()
+            raise
+
+    def _attach(self, width: int, height: int, *, phone: bool, dark: bool) -> None:
+        target = next(
+            t for t in self.send('Target.getTargets')['targetInfos'] if t['type'] == 'page'
+        )
+        attached = self.send('Target.attachToTarget', targetId=target['targetId'], flatten=True)
+        self._session = attached['sessionId']
+        for domain in ('Page', 'Runtime', 'Log', 'Network'):
+            self.send(f'{domain}.enable')
+        self.send(
+            'Emulation.setDeviceMetricsOverride',
+            width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,
+        )  # fmt: skip
+        if phone:
+            self.send('Emulation.setTouchEmulationEnabled', enabled=True)
+        scheme = {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}
+        self.send('Emulation.setEmulatedMedia', features=[scheme])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the browser and remove its folder."""
+        with suppress(OSError):
+            os.close(self._to)
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait(_DEADLINE)
+        with suppress(OSError):
+            os.close(self._from)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def send(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Send a command and return its result.
+
+        Raises:
+            BrowserError: The browser refused, ended, or gave no answer in time.
+        """
+        self._number += 1
+        message: dict[str, Any] = {'id': self._number, 'method': method, 'params': parameters}
+        if self._session:
+            message['sessionId'] = self._session
+        os.write(self._to, json.dumps(message).encode() + b'\0')
+        deadline = time.monotonic() + _DEADLINE
+        while time.monotonic() < deadline:
+            for answer in self._read(deadline):
+                if answer.get('id') == self._number:
+                    if 'error' in answer:
+                        raise BrowserError(f'{method}: {answer["error"]["message"]}')
+                    result: dict[str, Any] = answer['result']
+                    return result
+        raise BrowserError(f'{method}: no answer after {_DEADLINE:g} s')
+
+    def _read(self, deadline: float) -> list[dict[str, Any]]:
+        """Return the answers that have arrived; wait for bytes until the deadline."""
+        while time.monotonic() < deadline:
+            try:
+                data = os.read(self._from, 1 << 20)
+            except BlockingIOError:
+                time.sleep(0.002)
+                continue
+            if not data:
+                raise BrowserError('the browser has ended')
+            *whole, self._rest = (self._rest + data).split(b'\0')
+            if not whole:
+                continue
+            messages = [json.loads(part) for part in whole]
+            for message in messages:
+                self._note(message)
+            return messages
+        return []
+
+    def _note(self, message: dict[str, Any]) -> None:
+        values = message.get('params', {})
+        match message.get('method'):
+            case 'Runtime.consoleAPICalled' if values['type'] in {'error', 'warning', 'assert'}:
+                self.problems.append(' '.join(str(a.get('value', a)) for a in values['args']))
+            case 'Runtime.exceptionThrown':
+                details = values['exceptionDetails']
+                self.problems.append(
+                    details.get('exception', {}).get('description', details['text'])
+                )
+            case 'Log.entryAdded' if values['entry']['level'] in {'error', 'warning'}:
+                self.problems.append(values['entry']['text'])
+            case 'Network.requestWillBeSent':
+                self.requests.append(values['request']['url'][:200])
+
+    def before(self, script: str) -> None:
+        """Run a script in each page that is opened from now on, before its own."""
+        self.send('Page.addScriptToEvaluateOnNewDocument', source=script)
+
+    def open(self, address: Path | str) -> None:
+        """Open a file or an address, and wait until the document is loaded."""
+        url = address.resolve().as_uri() if isinstance(address, Path) else address
+        self.send('Page.navigate', url=url)
+        self.wait('document.readyState === "complete" && location.href !== "about:blank"')
+
+    def value(self, expression: str) -> Any:
+        """Return the value of a JavaScript expression, awaited if it is a promise.
+
+        Raises:
+            BrowserError: It throws.
+        """
+        answer = self.send(
+            'Runtime.evaluate', expression=expression, returnByValue=True, awaitPromise=True
+        )
+        if 'exceptionDetails' in answer:
+            details = answer['exceptionDetails']
+            raise BrowserError(details.get('exception', {}).get('description', details['text']))
+        return answer['result'].get('value')
+
+    def wait(self, condition: str, seconds: float = _DEADLINE) -> None:
+        """Wait until a JavaScript expression is true.
+
+        Raises:
+            BrowserError: It is still false after so many seconds.
+        """
+        deadline = time.monotonic() + seconds
+        while not self.value(condition):
+            if time.monotonic() > deadline:
+                raise BrowserError(f'still false after {seconds:g} s: {condition}')
+            time.sleep(0.02)
+
+    def picture(self, **clip: float) -> bytes:
+        """Return a PNG of the page as it is now; `x`, `y`, `width`, `height` cut a part out."""
+        options = {'clip': {**clip, 'scale': 1}} if clip else {}
+        return base64.b64decode(self.send('Page.captureScreenshot', **options)['data'])
