@@ -44,7 +44,7 @@ fly: setup ## throw a disc in real time, record and plot it (DISC=wraith THROW='
 	else \
 		echo 'fly: .venv has no ROS 2: computing the throw without simulator, recorder and bag'; \
 		mkdir -p flights && \
-		$(BIN)/fly --plot flights/fig5.png $(if $(DISC),--disc '$(DISC)') $(THROW); \
+		$(BIN)/fly --plot flights/fig5.png --html flights/fig5.html $(if $(DISC),--disc '$(DISC)') $(THROW); \
 	fi
 
 bench-flights: setup-test ## measure flights per second

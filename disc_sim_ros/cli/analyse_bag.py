@@ -10,7 +10,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output
+from disc_sim_ros.cli import output, pages
 from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError, printable
@@ -46,6 +46,7 @@ def parser(prog: str = 'analyse_bag') -> Parser:
         '--json', action='store_true', help='print one JSON document instead of the summary'
     )
     output.add_plot(p)
+    pages.add_page(p)
     p.add_argument(
         '--disc',
         default=argparse.SUPPRESS,
@@ -103,6 +104,12 @@ def _run(chosen: argparse.Namespace) -> int:
         if plot is not None:
             lines.append(f'wrote {plot}')
         output.show('\n'.join(lines))
+    if pages.is_wanted(chosen):  # after the numbers: they come even if it cannot be written
+        line = _write_page(chosen, every)
+        if chosen.json:
+            output.note(chosen.prog, line)
+        else:
+            output.show(line)
     if chosen.verify and not every:
         output.note(chosen.prog, 'note: there is no flight to verify')
     return DIFFERENT if chosen.verify and not (every and all(a.passed for a in every)) else 0
@@ -129,6 +136,13 @@ def _plot(name: str, bag: str, analyses: 'Sequence[Analysis]') -> None:
 
     title = bag_report.title(analyses[0]) if len(analyses) == 1 else Path(bag).name
     output.write_plot(name, plots.bag_figure(analyses, title))
+
+
+def _write_page(chosen: argparse.Namespace, analyses: 'Sequence[Analysis]') -> str:
+    if not analyses:
+        raise DiscSimError(f'{chosen.bag}: there is no flight to show')
+    name = Path(chosen.bag).resolve().name
+    return pages.write(chosen, [pages.recorded(a) for a in analyses], name, 'metric')
 
 
 def _bag_document(bag: 'Bag') -> dict[str, Any]:

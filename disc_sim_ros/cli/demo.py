@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self
 
 import disc_sim_ros
 from disc_sim_ros import __version__, topics
-from disc_sim_ros.cli import flags, output
+from disc_sim_ros.cli import flags, output, pages
 from disc_sim_ros.cli.arguments import Parser, add_quantity, path
 from disc_sim_ros.cli.main import DIFFERENT, run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
@@ -21,6 +21,7 @@ from disc_sim_ros.physics import flight
 from disc_sim_ros.quantities import DURATION, TIMING
 
 if TYPE_CHECKING:
+    from disc_sim_ros.analysis.bag_analysis import Analysis
     from disc_sim_ros.ros.client import DiscSample
 
 WHOLE_FLIGHT = TIMING['command_timeout'].highest  # s that --control acts without being renewed
@@ -50,8 +51,8 @@ def parser(prog: str = 'demo') -> Parser:
         type=path,
         default=argparse.SUPPRESS,
         metavar='DIR',
-        help='new folder for the bag; the plot is DIR.png (default: bag and flight.png in '
-        'flights/DATE_TIME)',
+        help='new folder for the bag; the plot is DIR.png, the page with the flight in 3D '
+        'DIR.html (default: bag, flight.png and flight.html in flights/DATE_TIME)',
     )
     return p
 
@@ -93,7 +94,7 @@ def _new_paths(bag: str | None) -> tuple[Path, Path]:
     if bag is not None:
         folder = Path(bag)
         plot = folder.with_name(f'{folder.name}.png')
-        for path in (folder, plot):
+        for path in (folder, plot, plot.with_suffix('.html')):
             if path.exists() or path.is_symlink() or not folder.name:
                 raise ConfigError('--bag', bag, f'{path} exists, and nothing is overwritten')
         _make(folder.parent, '--bag', bag)
@@ -223,6 +224,7 @@ def _report(bag: Path, plot: Path) -> int:
     title = bag_report.title(analyses[0])
     image = plots.image(plots.bag_figure(analyses, title), 'png')
     output.write_whole('--bag', str(plot), image)
+    page = _page(bag, plot.with_suffix('.html'), analyses)
     size = sum(file.stat().st_size for file in opened.files)
     losses = bag_analysis.losses(opened.custom_data)
     filled = sum(info.message_count > 0 for info in opened.topics)
@@ -235,13 +237,31 @@ def _report(bag: Path, plot: Path) -> int:
     lines += [
         f'  {bag}',
         f'  {plot}',
+        *([f'  {page}    the flight in 3D: open it in a browser'] if page else []),
         'next',
         f'  {_program_folder()}analyse_bag --verify {bag}',
         f'  ros2 bag play {bag}    (in an installation of ROS 2)',
         f'  Foxglove: open {opened.files[0]} with the layout {_layout()}',
     ]
     output.show('\n'.join(lines))
+    if page:
+        pages.opened(page)
     return 0 if all(a.passed for a in analyses) else DIFFERENT
+
+
+def _page(bag: Path, page: Path, analyses: 'Sequence[Analysis]') -> Path | None:
+    """Write the page of the flight; return None, after a note, if it cannot be written."""
+    from disc_sim_ros.view.page import ViewerMissingError  # noqa: PLC0415
+    from disc_sim_ros.view.page import page as page_of  # noqa: PLC0415
+    from disc_sim_ros.view.shown import SYSTEMS  # noqa: PLC0415
+
+    try:
+        content = page_of([pages.recorded(a) for a in analyses], bag.name, SYSTEMS['metric'])
+    except ViewerMissingError as error:
+        output.note('demo', f'note: {error}')
+        return None
+    output.write_whole('--bag', str(page), content)
+    return page
 
 
 def _program_folder() -> str:

@@ -10,11 +10,12 @@ import webbrowser
 
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import path
-from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.errors import ConfigError, DiscSimError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from disc_sim_ros.analysis.bag_analysis import Analysis
     from disc_sim_ros.view.shown import ShownFlight
 
 RATE = 200.0  # samples per second of a flight in a page, without --samples
@@ -41,6 +42,30 @@ def add_page(group: argparse._ActionsContainer) -> None:
 def is_wanted(chosen: argparse.Namespace) -> bool:
     """Return True if one of the flags of `add_page` was given."""
     return hasattr(chosen, 'html') or bool(chosen.view)
+
+
+def recorded(analysis: 'Analysis') -> 'ShownFlight':
+    """Return a flight of a bag for a page.
+
+    Raises:
+        DiscSimError: None of its messages has a position.
+    """
+    from disc_sim_ros.analysis import bag_report  # noqa: PLC0415 - scipy takes half a second
+    from disc_sim_ros.view import shown  # noqa: PLC0415
+
+    known = bag_report.document(analysis)
+    name = f'{analysis.flight.disc.name}, flight {analysis.flight.number}'
+    try:
+        return shown.of_recording(
+            analysis.trajectory,
+            name,
+            bag_report.title(analysis),
+            landed=known['landed'],
+            wind_is_known=analysis.wind_is_known,
+            turns_with_spin=known['launch']['frame_spins'],
+        )
+    except ValueError as error:
+        raise DiscSimError(f'{name}: {error}') from None
 
 
 def write(

@@ -11,6 +11,7 @@ from disc_sim_ros.physics.flight import Flight
 from disc_sim_ros.physics.trajectory import Trajectory
 from disc_sim_ros.units import UNITS
 
+LEVEL = (1.0, 0.0, 0.0, 0.0)  # the attitude of a disc that lies on the ground, heading +x
 MOST_SAMPLES = 6000  # of one flight in a page; longer ones are thinned out evenly
 # Digits behind the point: 0.1 mm, 1e-5 of a radian. They keep the page small.
 _PLACES = {'t': 4, 'position': 4, 'attitude': 6, 'spin': 4, 'wind': 3, 'curve': 4}
@@ -90,6 +91,44 @@ def of_flight(flight: Flight, name: str, system: System) -> ShownFlight:
     )
     trajectory = Trajectory(rows, flight.trajectory.diameter)
     return ShownFlight(name, result, trajectory, flight.landed)
+
+
+def of_recording(
+    trajectory: Trajectory,
+    name: str,
+    result: str,
+    *,
+    landed: bool,
+    wind_is_known: bool,
+    turns_with_spin: bool,
+) -> ShownFlight:
+    """Return a recorded flight, whose spin angle is the integral of its spin rate.
+
+    A recording may lack values: samples without a position are left out, and where there is no
+    attitude the disc is shown level.
+
+    Args:
+        trajectory: The recorded motion.
+        name: What the page calls it.
+        result: One line on how it ended.
+        landed: True if it ended on the ground.
+        wind_is_known: True if the trajectory has the wind of the flight.
+        turns_with_spin: True if the recorded attitude is that of the plastic, spin included.
+
+    Raises:
+        ValueError: No sample has a position.
+    """
+    rows = trajectory.rows[np.isfinite(trajectory.position).all(axis=1)]
+    if not len(rows):
+        raise ValueError('no sample has a position')
+    rows = rows.copy()
+    known = np.isfinite(rows[:, 7:11]).all(axis=1)
+    rows[~known, 7:11] = LEVEL
+    spin = np.zeros(len(rows)) if turns_with_spin else np.nan_to_num(rows[:, 13])
+    steps = np.diff(rows[:, 0]) * (spin[:-1] + spin[1:]) / 2.0
+    rows[:, 14] = np.concatenate([[0.0], np.cumsum(steps)])
+    wind_is_known = wind_is_known and bool(np.isfinite(rows[:, 15:]).all())
+    return ShownFlight(name, result, Trajectory(rows, trajectory.diameter), landed, wind_is_known)
 
 
 def thinned(trajectory: Trajectory, most: int = MOST_SAMPLES) -> Trajectory:

@@ -76,12 +76,13 @@ def test_it_throws_records_verifies_and_reports(tmp_path, capsys):
     assert process.returncode == 0, err
     assert all(line.startswith('demo: ') for line in err.splitlines()), err
     (folder,) = (tmp_path / 'flights').iterdir()
-    bag, plot = folder / 'bag', folder / 'flight.png'
-    assert sorted(folder.iterdir()) == [bag, plot]
+    bag, page, plot = (folder / name for name in ('bag', 'flight.html', 'flight.png'))
+    assert sorted(folder.iterdir()) == [bag, page, plot]
     assert image.imread(plot).shape[2] >= 3
     for text in (
         'identical to the last bit',
         'nothing lost',
+        str(page.relative_to(tmp_path)),
         'steered   coefficients changed once, first at 0.000 s',
         f'analyse_bag --verify {bag.relative_to(tmp_path)}',
         f'ros2 bag play {bag.relative_to(tmp_path)}',

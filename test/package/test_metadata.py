@@ -51,7 +51,7 @@ def test_ci_runs_the_two_commands_with_chromium_and_nothing_else():
     lines = (ROOT / '.ci/run').read_text(encoding='utf-8').splitlines()
     start = ['set -euo pipefail', 'cd "$(dirname "$0")/.."']
     # Chromium is a program of the system, which a virtual environment cannot have.
-    assert lines[1:] == [*start, 'tools/install-chromium', 'make fly', 'make test']
+    assert lines[1:] == [*start, 'tools/install-chromium', 'CI=true make fly', 'make test']
 
 
 @pytest.mark.parametrize('file', sorted((ROOT / '.github/ISSUE_TEMPLATE').glob('*.yml')))
