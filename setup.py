@@ -15,6 +15,7 @@ EXECUTABLES = {
     'demo': 'disc_sim_ros.cli.demo:main',
     'disc-sim': 'disc_sim_ros.cli.disc_sim:main',
     'fly': 'disc_sim_ros.cli.fly:main',
+    'live_view': 'disc_sim_ros.cli.live_view:main',
     'optimise': 'disc_sim_ros.cli.optimise:main',
     'paper_figures': 'disc_sim_ros.cli.paper_figures:main',
     'recorder_node': 'disc_sim_ros.cli.recorder_node:main',
@@ -120,8 +121,9 @@ setup(
         'fast': ['llvmlite>=0.43,<1', 'numba>=0.60,<1'],
         # Parquet tables of `sweep`.
         'parquet': ['pyarrow>=15,<30'],
-        # Pages with flights in 3D: `--html`, `--view`. Their viewer is no promise of trimesh.
-        'view': ['trimesh>=5,<6'],
+        # Pages with flights in 3D: `--html`, `--view`, live_view. Their viewer is no promise of
+        # trimesh. Ubuntu 24.04 has websockets 10, without the server in use.
+        'view': ['trimesh>=5,<6', 'websockets>=13,<18'],
         # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
         # `make docs`.

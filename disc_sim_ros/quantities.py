@@ -342,6 +342,12 @@ RECORDING = _table(
     BAG_FILES['flush_period'].within(0.01, 60.0),
 )  # fmt: skip
 
+# The page of the running simulator.
+LIVE_VIEW = _table(
+    Quantity('port', '', 0, 65_535, 8080, 'Port of the page; 0: a free one', whole=True),
+    Quantity('page_rate', 'Hz', 1.0, 120.0, 30.0, 'States per second that the page gets'),
+)
+
 # Ensembles.
 STUDY = _table(
     Quantity('count', '', 1, 2**30, 1, 'Samples at each point of a grid', whole=True),
@@ -365,6 +371,7 @@ QUANTITIES = {
     **IMU,
     **RECORDING,
     **BAG_FILES,
+    **LIVE_VIEW,
     **STUDY,
     **THROWER,
     **FLIGHT_NUMBERS,

@@ -77,6 +77,7 @@ WHY = {
     'Sphinx': 'builds the documentation site',
     'trimesh': 'the viewer of pages with flights, with three.js in it',
     'types-PyYAML': 'types of PyYAML for mypy',
+    'websockets': 'the web server of `live_view`',
     'zstandard': 'bags with zstd chunks',
 }
 PERMISSIVE = {

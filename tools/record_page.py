@@ -73,7 +73,7 @@ def main() -> None:
     durations = [step] * len(others) + [round(1000.0 * REST)]
     first.save(
         chosen.output, save_all=True, append_images=others, duration=durations, loop=0,
-        quality=50, method=6,
+        quality=48, method=6,
     )  # fmt: skip
     sys.stdout.write(f'{chosen.output}: {chosen.output.stat().st_size / 1e6:.2f} MB\n')
 

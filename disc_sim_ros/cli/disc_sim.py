@@ -73,6 +73,12 @@ def _recorder_node() -> Program:
     return recorder_node.main
 
 
+def _live_view() -> Program:
+    from disc_sim_ros.cli import live_view  # noqa: PLC0415
+
+    return live_view.main
+
+
 PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
     'fly': (_fly, 'compute one flight: summary, JSON, CSV, plot or bag'),
     'sweep': (_sweep, 'compute grids and random ensembles of flights into one file'),
@@ -80,6 +86,7 @@ PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
     'demo': (_demo, 'throw in real time, record and analyse the flight (ROS 2)'),
     'sim_node': (_sim_node, 'run the simulator node (ROS 2)'),
     'recorder_node': (_recorder_node, 'run the recorder node (ROS 2)'),
+    'live_view': (_live_view, 'show the running simulators in a browser (ROS 2)'),
     'analyse_bag': (_analyse_bag, 'summarise, verify or plot the flights in a bag'),
     'repair_bag': (_repair_bag, 'copy what a damaged bag still holds into a complete one'),
     'paper_figures': (_paper_figures, 'compute the figures of Crowther & Potts (2007)'),

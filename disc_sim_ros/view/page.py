@@ -8,6 +8,7 @@ from typing import Any
 
 from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.palette import COLOURS
+from disc_sim_ros.quantities import LAUNCH
 from disc_sim_ros.view.shown import ShownFlight, System, curve_labels, document
 
 TRIMESH = (5, 6)  # from and below: the page uses names of its viewer that are not promised
@@ -17,7 +18,17 @@ _POLICY = (
     'img-src data: blob:; connect-src data: blob:'
 )
 _BLACK = {'#000000': '#808080'}  # which a dark page would hide
-_SCRIPTS = ('pose.js', 'scene.js', 'camera.js', 'curves.js', 'controls.js')
+_LIVE_POLICY = f"{_POLICY} 'self'"  # and the server of the page
+_SCRIPTS = ('pose.js', 'scene.js', 'camera.js', 'curves.js', 'live.js', 'controls.js')
+# Of the page of a running simulator: least and greatest value, and step.
+_SLIDERS = {
+    'speed': (5.0, 35.0, 0.5),
+    'pitch': (-20.0, 45.0, 1.0),
+    'roll': (-60.0, 60.0, 1.0),
+    'yaw': (-45.0, 45.0, 1.0),
+    'spin': (-150.0, 150.0, 1.0),
+    'height': (0.0, 3.0, 0.1),
+}
 
 
 class ViewerMissingError(DiscSimError):
@@ -38,16 +49,35 @@ def page(flights: Sequence[ShownFlight], title: str, system: System) -> bytes:
     """
     if not flights:
         raise ValueError('a page needs at least one flight')
-    values = {
-        'title': title,
-        'units': {'length': system.length, 'speed': system.speed},
-        'metresPerLength': 1.0 / system.lengths(1.0),
-        'metresPerSecondPerSpeed': 1.0 / system.speeds(1.0),
-        'colours': [_BLACK.get(colour, colour) for colour in COLOURS],
-        'labels': [list(label) for label in curve_labels(system)],
+    values = _head(title, system) | {
         'tracks': [document(flight, system) for flight in flights],
+        'live': None,
     }
     return assembled(viewer(), title, values).encode()
+
+
+def live_page(system: System) -> bytes:
+    """Return the page that shows running simulators and has sliders to throw, see `ros.live`.
+
+    Args:
+        system: Units of all that people read; the sliders have those of `quantities.LAUNCH`.
+
+    Raises:
+        ViewerMissingError: trimesh is missing or has the wrong version.
+    """
+    sliders = [
+        {
+            'name': name,
+            'unit': LAUNCH[name].unit.replace('degrees', '°'),
+            'low': low,
+            'high': high,
+            'step': step,
+            'value': LAUNCH[name].default,
+        }
+        for name, (low, high, step) in _SLIDERS.items()
+    ]
+    values = _head('Live view', system) | {'tracks': [], 'live': {'sliders': sliders}}
+    return assembled(viewer(), 'Live view', values).encode()
 
 
 def viewer() -> str:
@@ -72,8 +102,9 @@ def viewer() -> str:
 def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
     """Return the page of trimesh with our style, controls, data and scripts in it."""
     data = json.dumps(values, allow_nan=False, separators=(',', ':')).replace('<', '\\u003c')
+    policy = _LIVE_POLICY if values.get('live') else _POLICY
     head = (
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         f'<title>{escape(printable(title))}</title><style>{_asset("page.css")}</style></head>'
     )
     scripts = '\n'.join(_asset(name) for name in _SCRIPTS)
@@ -88,6 +119,17 @@ def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
     rest = rest.replace('</head>', head, 1)
     before, _, after = rest.rpartition('</body>')
     return before.join((start, body)) + after
+
+
+def _head(title: str, system: System) -> dict[str, Any]:
+    return {
+        'title': title,
+        'units': {'length': system.length, 'speed': system.speed},
+        'metresPerLength': 1.0 / system.lengths(1.0),
+        'metresPerSecondPerSpeed': 1.0 / system.speeds(1.0),
+        'colours': [_BLACK.get(colour, colour) for colour in COLOURS],
+        'labels': [list(label) for label in curve_labels(system)],
+    }
 
 
 def _asset(name: str) -> str:

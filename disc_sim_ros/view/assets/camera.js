@@ -3,6 +3,7 @@ const eye = { mode: 'follow', azimuth: 0, elevation: 0, distance: 1, target: [0,
 const LIMIT = 1.55; // rad: not quite upright, where left and right have no meaning
 
 function heading() {
+  if (page.live || !tracks.length) return 0;
   const { position } = tracks[chosen], n = position.length;
   return Math.atan2(position[n - 2] - position[1], position[n - 3] - position[0]);
 }
@@ -13,7 +14,7 @@ function aim(mode) {
   if (mode === 'follow') {
     eye.azimuth = heading() + Math.PI + 0.65;
     eye.elevation = 0.42;
-    eye.distance = 6.5 * Math.max(...tracks.map(shownDiameter));
+    eye.distance = 6.5 * Math.max(1, ...tracks.map(shownDiameter));
     if (camera.aspect < 1) eye.distance /= Math.max(0.6, camera.aspect);
     return;
   }
@@ -27,7 +28,7 @@ function aim(mode) {
 }
 
 function look() {
-  if (eye.mode === 'follow') eye.target = picture.discs[chosen].body.position.toArray();
+  if (eye.mode === 'follow' && picture.discs.length) eye.target = picture.discs[chosen].body.position.toArray();
   const { camera } = picture, flat = eye.distance * Math.cos(eye.elevation);
   camera.position.set(
     eye.target[0] + flat * Math.cos(eye.azimuth),

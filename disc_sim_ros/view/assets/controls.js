@@ -5,6 +5,10 @@ function write() {
   const end = duration();
   element('time').value = end ? time / end : 0;
   element('clock').value = `${time.toFixed(2)} / ${end.toFixed(2)} s`;
+  if (!tracks.length || !tracks[chosen].t.length) {
+    element('now').textContent = 'waiting for a disc';
+    return;
+  }
   markTime(time, chosen);
   const wind = picture.ready && tracks[chosen].wind ? poseAt(tracks[chosen], time).wind : null;
   const rows = page.labels.slice(0, 4).map(([name, unit], which) => `${number(curveAt(tracks[chosen], which, time))} ${unit}  ${name}`);
@@ -14,7 +18,12 @@ function write() {
 
 function frame(now) {
   requestAnimationFrame(frame);
-  if (playing) {
+  if (page.live) {
+    const was = time;
+    if (playing && tracks.length) time = liveTime(time, before === null ? 0 : (now - before) / 1000);
+    redrawLive(now);
+    stale ||= time !== was;
+  } else if (playing) {
     time = Math.min(duration(), time + (before === null ? 0 : speed * (now - before) / 1000));
     if (time >= duration()) play(false);
     stale = true;
@@ -23,21 +32,22 @@ function frame(now) {
   if (!stale) return;
   stale = false;
   write();
-  if (!picture.ready) return;
-  pose(time, chosen);
+  if (!picture.ready || picture.discs.some(made => !made.track.t.length) || (page.live && !tracks.length)) return;
+  pose(time, chosen, page.live && playing ? endOf(tracks[chosen]) - time : null);
   look();
   renderer.render(picture.scene, picture.camera);
 }
 
 function play(on) {
-  if (on && time >= duration()) time = 0;
+  if (on && !page.live && time >= duration()) time = 0;
   playing = on;
   before = null;
-  element('play').textContent = on ? 'Pause' : 'Play';
+  element('play').textContent = on ? 'Pause' : page.live ? 'Live' : 'Play';
   stale = true;
 }
 
 function seek(to) {
+  if (page.live && playing) play(false);
   time = Math.min(duration(), Math.max(0, to));
   stale = true;
 }
@@ -57,6 +67,7 @@ function paint(theme) {
 }
 
 function listFlights() {
+  element('flights-list').replaceChildren();
   tracks.forEach((track, i) => {
     const row = document.createElement('li'), button = document.createElement('button');
     button.type = 'button';
@@ -71,7 +82,7 @@ function listFlights() {
     row.append(button);
     element('flights-list').append(row);
   });
-  choose(0);
+  choose(chosen);
 }
 
 function setCamera(mode) {
@@ -111,7 +122,7 @@ function start() {
   steer(renderer.domElement, () => { stale = true; });
   picture.ready = true;
   stale = true;
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
+  if (page.live || !matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
 }
 
 // The viewer of trimesh loads its parts a moment after the page; without WebGL it never does.
@@ -128,14 +139,21 @@ paint(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 listFlights();
 connect();
 makeCurves(seek);
+if (page.live) {
+  throwPanel();
+  connectLive();
+}
 requestAnimationFrame(frame);
 wait();
 
 // For tests and recordings: the picture at any time, and where it shows a disc.
 window.discView = {
+  get flights() { return tracks.map(track => [track.name, track.t.length, track.flight]); },
   get ready() { return picture.ready; },
   get time() { return time; },
   get playing() { return playing; },
+  // Press the button of a live view; return the answer to the last time.
+  throws() { document.querySelector('#throw button').click(); return document.querySelector('#throw > output').textContent; },
   duration, seek, play, choose, setCamera, setSize, paint,
   pose: (i = 0) => poseAt(tracks[i], time),
   pixel(i = 0) {

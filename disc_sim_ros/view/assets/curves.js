@@ -77,6 +77,7 @@ const redrawCurves = seek => charts.forEach((chart, which) => draw(chart, which,
 const number = (value, digits = 2) => value === null ? '-' : value.toFixed(digits).replace('-', '\u2212');
 
 function markTime(time, chosen) {
+  if (!tracks.length) return;
   charts.forEach((chart, which) => {
     const x = chart.x(time);
     chart.line.setAttribute('x1', x);

@@ -5,7 +5,7 @@ const tracks = page.tracks;
 const element = id => document.getElementById(id);
 const colourOf = i => page.colours[i % page.colours.length];
 const endOf = track => track.t.length ? track.t[track.t.length - 1] : 0;
-const duration = () => Math.max(...tracks.map(endOf));
+const duration = () => Math.max(0, ...tracks.map(endOf));
 
 // Return the sample before a time, and how far the time lies towards the next one, 0 to 1.
 function placeIn(t, time) {

@@ -12,6 +12,7 @@ function extent() {
       high[i % 3] = Math.max(high[i % 3], value);
     });
   }
+  if (page.live) [[-3, 30], [-8, 8], [0, 5]].forEach(([a, b], i) => { low[i] = Math.min(low[i], a); high[i] = Math.max(high[i], b); });
   low[2] = Math.min(low[2], 0);
   return { low, high, span: Math.max(...high.map((value, i) => value - low[i]), 1) };
 }
@@ -68,7 +69,6 @@ function ground({ low, high, span }) {
 
 // The path as a tube whose parameter is the time, so that its drawn part ends at the disc.
 function tube(track, colour, radius) {
-  if (track.t.length < 2) return null;
   class Path extends THREE.Curve {
     getPoint(u) { return new THREE.Vector3(...poseAt(track, track.t[0] + u * (endOf(track) - track.t[0])).position); }
     getPointAt(u) { return this.getPoint(u); }
@@ -123,6 +123,16 @@ function takeOver() {
   picture.camera.up.set(0, 0, 1);
 }
 
+// Make the paths of a disc anew: thin ones for the near camera, thick ones for the far ones.
+function repath(made, i) {
+  for (const path of made.paths || []) for (const mesh of [path.flown, path.rest]) { mesh.removeFromParent(); mesh.geometry.dispose(); mesh.material.dispose(); }
+  const thick = 0.0016 * picture.bounds.span, linear = mesh => { mesh.material.color.convertSRGBToLinear(); return mesh; };
+  made.paths = made.track.t.length < 2 ? [] : [Math.min(0.03, thick), thick].map(radius => ({
+    flown: linear(tube(made.track, colourOf(i), radius)), rest: linear(tube(made.track, css('--soft'), 0.35 * radius)),
+  }));
+  for (const path of made.paths) picture.scene.add(path.flown, path.rest);
+}
+
 function build() {
   const all = picture.scene = new THREE.Scene();
   const bounds = picture.bounds = extent();
@@ -134,17 +144,16 @@ function build() {
   all.add(sun, ground(bounds));
   picture.discs = tracks.map((track, i) => {
     const made = disc(track, i, picture.parts);
-    made.paths = [Math.min(0.03, 0.0016 * bounds.span), 0.0016 * bounds.span].map(radius => ({
-      flown: tube(track, colourOf(i), radius), rest: tube(track, css('--soft'), 0.35 * radius),
-    })).filter(path => path.flown);
-    all.add(made.body, made.shadow, made.plumb, ...made.paths.flatMap(path => [path.flown, path.rest]));
+    all.add(made.body, made.shadow, made.plumb);
     return made;
   });
   picture.arrow = arrow();
+  picture.arrow.visible = false;
   all.add(picture.arrow);
   const plain = new Set(); // materials whose colours were given as seen on the screen
   all.traverse(({ material }) => { if (material && (material.isLineBasicMaterial || material.isMeshBasicMaterial)) plain.add(material); });
   plain.forEach(material => material.color.convertSRGBToLinear());
+  picture.discs.forEach(repath);
 }
 
 // An enlarged disc is 4 times as large beside the camera, and large enough to be seen from afar.
@@ -153,8 +162,10 @@ function shownDiameter({ diameter }) {
   return eye.mode === 'follow' ? 4 * diameter : Math.max(4 * diameter, 0.035 * picture.bounds.span);
 }
 
-function pose(time, chosen) {
+// Place the discs. Those of a running simulator fly at times of their own, all equally late.
+function pose(now, chosen, late) {
   picture.discs.forEach((made, i) => {
+    const time = late === null ? now : Math.max(0, endOf(made.track) - late);
     const { position, attitude, wind } = poseAt(made.track, time);
     const wide = shownDiameter(made.track);
     made.body.position.set(...position);

@@ -1,0 +1,233 @@
+"""live_view: its options, its server, and the page of a real simulator in a real browser."""
+
+from collections.abc import Iterator
+import contextlib
+import http.client
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('trimesh')
+pytest.importorskip('websockets.asyncio')
+
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+import browser
+from disc_sim_ros import Launch, Setup, fly, load_disc
+from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.ros.live.options import live_config
+from disc_sim_ros.ros.live.server import LiveServer
+from ros.sim_process import DEADLINE
+
+pytestmark = pytest.mark.ros
+PAGE = b'<!DOCTYPE html><title>x</title>'
+THROW = {'speed': 12.0, 'pitch': 10.0, 'spin': 40.0, 'height': 1.0}
+
+
+# ---- options ----
+
+
+def test_the_defaults_are_this_machine_alone():
+    config = live_config({})
+    assert config.is_local
+    assert config.rate == 30.0
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'allowed'),
+    [
+        ('address', 'example.org', 'numeric address'),
+        ('port', 70_000, '65535'),
+        ('rate', 0.0, '120'),
+        ('units', 'feet', 'metric, us'),
+        ('speed', 1.0, 'no such parameter'),
+    ],
+)
+def test_bad_values_are_refused(name, value, allowed):
+    with pytest.raises(ConfigError, match=allowed):
+        live_config({name: value})
+
+
+def test_the_whole_network_is_not_local():
+    assert not live_config({'address': '0.0.0.0'}).is_local
+
+
+# ---- server ----
+
+
+@contextlib.contextmanager
+def serving(throw=lambda _: 'thrown') -> Iterator[tuple[LiveServer, str]]:
+    server = LiveServer('127.0.0.1', 0, PAGE, throw)
+    address = server.start_serving()
+    try:
+        yield server, address
+    finally:
+        server.end()
+
+
+def port_of(address: str) -> int:
+    return int(re.match(r'http://127\.0\.0\.1:(\d+)/#', address)[1])
+
+
+def socket_of(address: str) -> str:
+    return f'ws://127.0.0.1:{port_of(address)}/live'
+
+
+def answer(connection, **values) -> str:
+    connection.send(json.dumps(values))
+    while 'answer' not in (message := json.loads(connection.recv(DEADLINE))):
+        pass
+    return message['answer']
+
+
+def test_it_serves_one_page():
+    with serving() as (_, address):
+        for path, status, body in (('/', 200, PAGE), ('/x', 404, b'there is one page: /')):
+            connection = http.client.HTTPConnection(
+                '127.0.0.1', port_of(address), timeout=DEADLINE
+            )
+            connection.request('GET', path)
+            response = connection.getresponse()
+            assert (response.status, response.read()) == (status, body)
+            connection.close()
+
+
+def test_a_page_of_another_server_gets_nothing():
+    with (
+        serving() as (_, address),
+        pytest.raises(InvalidStatus, match='403'),
+        connect(socket_of(address), origin='http://example.org'),
+    ):
+        pass
+
+
+def test_only_who_has_the_token_throws():
+    thrown = []
+
+    def throw(values):
+        if values.get('speed') == 0.0:
+            raise DiscSimError('too slow')
+        thrown.append(values)
+        return 'thrown'
+
+    with serving(throw) as (server, address), connect(socket_of(address)) as viewer:
+        for token in ('', 'x' * len(server.token), server.token.swapcase()):
+            assert answer(viewer, speed=1.0, token=token).startswith('error: open the page')
+        assert answer(viewer, speed=1.0).startswith('error: open the page')
+        assert not thrown
+        assert answer(viewer, speed=1.0, token=server.token) == 'thrown'
+        assert answer(viewer, speed=0.0, token=server.token) == 'error: too slow'
+        viewer.send('not JSON')
+        assert json.loads(viewer.recv(DEADLINE)) == {'answer': 'error: not JSON'}
+    assert thrown == [{'speed': 1.0}]
+
+
+def test_a_port_in_use_is_refused():
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError, match=r'port.*Address already in use'):
+            LiveServer('127.0.0.1', port, PAGE, str).start_serving()
+
+
+# ---- the node ----
+
+
+@pytest.fixture
+def live(ros, tmp_path):
+    """The process of live_view and the address of its page."""
+    log = tmp_path / 'live.txt'
+    command = [sys.executable, '-m', 'disc_sim_ros.ros.live', '--ros-args', '-p', 'port:=0']
+    with log.open('wb') as file:
+        process = subprocess.Popen(command, stdout=file, stderr=file)
+    try:
+        end = time.monotonic() + DEADLINE
+        while (match := re.search(r'http://\S+', log.read_text())) is None:
+            assert process.poll() is None, log.read_text()
+            assert time.monotonic() < end, log.read_text()
+            time.sleep(0.05)
+        yield process, match[0]
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(DEADLINE) == 0, log.read_text()
+        assert 'Traceback' not in log.read_text()
+
+
+def states(viewer, until) -> list[dict]:
+    """Return the states of the disc until a condition of them holds."""
+    received: list[dict] = []
+    end = time.monotonic() + DEADLINE
+    while not received or not until(received):
+        assert time.monotonic() < end, received[-3:]
+        message = json.loads(viewer.recv(DEADLINE))
+        received += list(message.get('discs', {}).values())
+    return received
+
+
+def throw_when_ready(viewer, token: str) -> None:
+    """Throw as soon as the simulator and live_view have discovered each other."""
+    end = time.monotonic() + DEADLINE
+    while (said := answer(viewer, disc='', token=token, **THROW)) != 'thrown':
+        assert said == 'error: no simulator takes throws for this disc'
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def test_the_states_are_those_of_the_flight(ros, live):
+    sim = ros.start({'auto_throw': False})
+    _, address = live
+    token = address.partition('#')[2]
+    expected = fly(Launch(**THROW), Setup(disc=load_disc('frisbee'), step=1e-3))
+    with connect(socket_of(address)) as viewer:
+        throw_when_ready(viewer, token)
+        said = answer(viewer, disc='', token=token, speed=1e6)
+        assert said.startswith('error: speed: ')
+        assert '200' in said
+        assert 'choose from speed' in answer(viewer, disc='', token=token, mass=1.0)
+        assert 'no simulator' in answer(viewer, disc='/red', token=token)
+        flown = states(viewer, lambda s: s[-1]['t'] >= expected.time - 1e-3)
+    assert sim.process.poll() is None
+    times = [state['t'] for state in flown]
+    assert times == sorted(times)
+    assert {(s['name'], s['diameter'], s['wind']) for s in flown} == {('frisbee', 0.275, None)}
+    # The last state is the first one after the landing: a period of 1/30 s later, if the machine
+    # is in time. A disc at rest gives no further states.
+    assert expected.time <= times[-1] < expected.time + 1.0
+    assert flown[-1]['position'][:2] == pytest.approx(expected.position[:2], abs=0.05)
+    turned = flown[-2]['spin'] - flown[0]['spin']
+    # Clockwise from above is negative about z up; the spin falls by a few percent from 40 rad/s.
+    assert turned == pytest.approx(-39.5 * (times[-2] - times[0]), rel=0.03)
+
+
+@pytest.mark.skipif(browser.program() is None, reason=browser.MISSING)
+def test_the_button_throws_and_the_page_shows_it(ros, live):
+    ros.start({'auto_throw': False})
+    _, address = live
+    with browser.Browser(700, 700) as tab:
+        tab.open(address)
+        tab.wait('discView.ready')
+        tab.wait('discView.throws() === "thrown"')
+        tab.wait('discView.flights.length === 1 && discView.time > 0.5')
+        first = tab.value('discView.pose(0).position')
+        tab.wait(f'discView.pose(0).position[0] > {first[0] + 2.0}')
+        tab.wait('document.querySelectorAll("figure svg path").length === 6')
+        assert 'airspeed' in tab.value('document.getElementById("now").textContent')
+        assert tab.problems == []
+        hosts = {r.partition('//')[2].partition('/')[0] for r in tab.requests if '//' in r}
+    assert hosts <= {address.partition('//')[2].partition('/')[0]}
+
+
+def test_an_argument_that_is_not_allowed_ends_with_2(ros_environment):
+    command = [sys.executable, '-m', 'disc_sim_ros.ros.live', '--ros-args', '-p', 'rate:=1000.0']
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert done.returncode == 2
+    assert re.search(r'live_view: error: rate: .*120', done.stderr)
