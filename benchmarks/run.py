@@ -36,6 +36,7 @@ BENCHMARKS: dict[str, tuple[dict[str, Any], str]] = {
     'recorder': ({'seconds': 30.0}, ' 30'),
     'bag_writer': ({}, ''),
     'bag_killed': ({}, ''),
+    'view': ({}, ''),
 }
 PEERS = pages.ROOT / 'peers/bin/python'
 

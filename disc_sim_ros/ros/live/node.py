@@ -8,7 +8,6 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError, DiscSimError
@@ -19,7 +18,6 @@ from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.live.discs import LiveDisc
 from disc_sim_ros.ros.live.options import LIVE_TABLE, live_config
 from disc_sim_ros.ros.live.server import LiveServer
-from disc_sim_ros.ros.qos import COMMAND_QOS
 from disc_sim_ros.ros.recorder.polling_thread import PollingThread
 from disc_sim_ros.view.page import live_page
 from disc_sim_ros.view.shown import SYSTEMS
@@ -44,7 +42,6 @@ class LiveViewNode(Node):
         config = live_config(parameters.values(self, LIVE_TABLE))
         self._system = SYSTEMS[config.units]
         self._discs: dict[str, LiveDisc] = {}
-        self._throws: dict[str, Publisher] = {}
         self._server = LiveServer(
             config.address, config.port, live_page(self._system), self._throw
         )
@@ -84,11 +81,7 @@ class LiveViewNode(Node):
         for name, types in self.get_topic_names_and_types():
             namespace, _, last = name.rpartition('/')
             if last == topics.ODOM and _ODOMETRY in types and namespace not in self._discs:
-                publisher = self.create_publisher(
-                    Odometry, f'{namespace}/{topics.THROW}', COMMAND_QOS
-                )
-                self._throws[namespace] = publisher
-                # Last, and as a new dictionary: another thread reads it.
+                # A new dictionary: other threads read the old one.
                 self._discs = {**self._discs, namespace: LiveDisc(self, namespace)}
 
     def _send(self) -> bool:
@@ -111,16 +104,15 @@ class LiveViewNode(Node):
             DiscSimError: There is no such disc, or it does not take throws.
         """
         namespace = values.pop('disc', '')
-        publisher = self._throws.get(namespace) if isinstance(namespace, str) else None
-        if publisher is None or not publisher.get_subscription_count():
+        disc = self._discs.get(namespace) if isinstance(namespace, str) else None
+        if disc is None or not disc.throw.get_subscription_count():
             raise DiscSimError('no simulator takes throws for this disc')
         for name, value in values.items():
             if name not in LAUNCH:
                 raise ConfigError(name, value, f'choose from {", ".join(LAUNCH)}')
         launch = Launch(**{n: LAUNCH[n].check(x, n) for n, x in values.items()})
         require_above_ground(launch.height)
-        disc = self._discs[namespace]
-        publisher.publish(_odometry(launch, disc.frame, disc.child_frame))
+        disc.throw.publish(_odometry(launch, disc.frame, disc.child_frame))
         return 'thrown'
 
 

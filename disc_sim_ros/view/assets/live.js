@@ -43,6 +43,9 @@ function receive(discs) {
       listed ||= tracks[i].name !== state.name;
       tracks[i] = Object.assign(tracks[i], freshTrack(state));
       if (i === chosen) live.landing = null;
+    } else if (tracks[i].name !== state.name) { // the configuration came after the first states
+      Object.assign(tracks[i], { name: state.name, diameter: state.diameter });
+      listed = true;
     }
     append(tracks[i], state);
     if (state.landing && i === chosen) live.landing = state.landing;

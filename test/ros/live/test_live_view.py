@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
@@ -23,6 +24,8 @@ from websockets.sync.client import connect
 import browser
 from disc_sim_ros import Launch, Setup, fly, load_disc
 from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics import frames
+from disc_sim_ros.ros.live import discs
 from disc_sim_ros.ros.live.options import live_config
 from disc_sim_ros.ros.live.server import LiveServer
 from ros.sim_process import DEADLINE
@@ -139,6 +142,24 @@ def test_a_port_in_use_is_refused():
             LiveServer('127.0.0.1', port, PAGE, str).start_serving()
 
 
+# ---- one state ----
+
+
+def test_a_state_is_that_of_the_arrays():
+    numbers = np.array([1.0, -2.0, 3.0, 0.1, -0.5, 0.3, 0.8, 11.0, -1.0, 2.0, 0.3, -0.2, -31.0])
+    numbers[3:7] /= np.linalg.norm(numbers[3:7])
+    (expected,) = frames.states_from_odometry(numbers[None])
+    state = discs._state_of(tuple(numbers))
+    assert state == pytest.approx(expected, abs=1e-12)  # rounding
+    phi, theta, _ = np.degrees(frames.euler_from_quaternion(expected[6:10]))
+    assert discs._pitch_and_roll(state) == pytest.approx((theta, phi), abs=1e-10)
+
+
+def test_a_disc_without_attitude_lies_level():
+    state = discs._state_of((0.0,) * 13)
+    assert state[6:10] == (1.0, 0.0, 0.0, 0.0)
+
+
 # ---- the node ----
 
 
@@ -198,7 +219,8 @@ def test_the_states_are_those_of_the_flight(ros, live):
     assert sim.process.poll() is None
     times = [state['t'] for state in flown]
     assert times == sorted(times)
-    assert {(s['name'], s['diameter'], s['wind']) for s in flown} == {('frisbee', 0.275, None)}
+    last = flown[-1]  # the first ones may come before the configuration, which says what flies
+    assert (last['name'], last['diameter'], last['wind']) == ('frisbee', 0.275, None)
     # The last state is the first one after the landing: a period of 1/30 s later, if the machine
     # is in time. A disc at rest gives no further states.
     assert expected.time <= times[-1] < expected.time + 1.0
