@@ -79,7 +79,7 @@ function tube(track, colour, radius) {
     new THREE.TubeGeometry(new Path(), segments, radius, around, false),
     new THREE.MeshBasicMaterial({ color: new THREE.Color(colour) }),
   );
-  mesh.userData = { segments, around };
+  mesh.userData = { segments, around, start: track.t[0], end: endOf(track) };
   return mesh;
 }
 
@@ -176,9 +176,10 @@ function pose(now, chosen, late) {
     made.plumb.position.set(position[0], position[1], 0);
     made.plumb.scale.set(1, 1, position[2] || 1e-9);
     made.paths.forEach(({ flown, rest }, j) => {
-      flown.visible = rest.visible = (j === 1) === (eye.mode !== 'follow');
-      const { segments, around } = flown.userData, start = made.track.t[0];
-      const part = Math.min(1, Math.max(0, (time - start) / (endOf(made.track) - start || 1)));
+      flown.visible = (j === 1) === (eye.mode !== 'follow');
+      rest.visible = flown.visible && late === null;
+      const { segments, around, start, end } = flown.userData;
+      const part = Math.min(1, Math.max(0, (time - start) / (end - start || 1)));
       flown.geometry.setDrawRange(0, Math.floor(part * segments) * around * 6);
     });
     if (i !== chosen) return;

@@ -18,6 +18,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('trimesh')
 pytest.importorskip('websockets.asyncio')
 
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -215,8 +216,12 @@ def test_the_states_are_those_of_the_flight(ros, live):
         assert '200' in said
         assert 'choose from speed' in answer(viewer, disc='', token=token, mass=1.0)
         assert 'no simulator' in answer(viewer, disc='/red', token=token)
+        prediction = PoseWithCovarianceStamped()
+        prediction.pose.pose.position.x = 17.0
+        ros.publisher(PoseWithCovarianceStamped, discs.PREDICTED_LANDING).publish(prediction)
         flown = states(viewer, lambda s: s[-1]['t'] >= expected.time - 1e-3)
     assert sim.process.poll() is None
+    assert [17.0, 0.0, 0.0] in [state.get('landing') for state in flown]
     times = [state['t'] for state in flown]
     assert times == sorted(times)
     last = flown[-1]  # the first ones may come before the configuration, which says what flies
