@@ -9,9 +9,10 @@ from typing import Any
 from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.quantities import LAUNCH
-from disc_sim_ros.view.shown import ShownFlight, System, curve_labels, document
+from disc_sim_ros.view.shown import MOST_SAMPLES, ShownFlight, System, curve_labels, document
 
 TRIMESH = (5, 6)  # from and below: the page uses names of its viewer that are not promised
+MOST_SAMPLES_OF_PAGE = 24_000  # of all flights together: 5 MB
 # Forbids every request: the page works from a file, and nothing in it can ask a host.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -49,8 +50,9 @@ def page(flights: Sequence[ShownFlight], title: str, system: System) -> bytes:
     """
     if not flights:
         raise ValueError('a page needs at least one flight')
+    most = max(2, min(MOST_SAMPLES, MOST_SAMPLES_OF_PAGE // len(flights)))
     values = _head(title, system) | {
-        'tracks': [document(flight, system) for flight in flights],
+        'tracks': [document(flight, system, most) for flight in flights],
         'live': None,
     }
     return assembled(viewer(), title, values).encode()

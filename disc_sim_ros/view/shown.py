@@ -152,15 +152,15 @@ def curve_labels(system: System) -> list[tuple[str, str]]:
     ]
 
 
-def document(flight: ShownFlight, system: System) -> dict[str, Any]:
+def document(flight: ShownFlight, system: System, most: int = MOST_SAMPLES) -> dict[str, Any]:
     """Return a flight as values that JSON knows.
 
     Positions [m] and quaternions x, y, z, w are those of `disc` in `map`, one after the other in
     flat lists. `spin` is the angle of `disc_body` in `disc` about z up [rad], not reduced to one
     turn, so that a page can interpolate it for any spin rate. Curves are in units of `system`;
-    null where a value does not exist.
+    null where a value does not exist. A longer flight is thinned to `most` samples.
     """
-    t = thinned(flight.trajectory)
+    t = thinned(flight.trajectory, most)
     up = frames.map_from_paper(t.position)
     wind = frames.map_from_paper(t.wind)
     euler = np.degrees(np.unwrap(t.euler, axis=0))

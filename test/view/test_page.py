@@ -109,6 +109,15 @@ def test_a_page_is_one_file_of_a_megabyte_that_asks_no_host(flight):
     assert data_of(content)['title'] == 'A <b> & title'
 
 
+def test_many_flights_stay_below_6_mb(flight):
+    flights = [shown.of_flight(flight, f'throw {i}', METRIC) for i in range(150)]
+    content = page(flights, 'A field test', METRIC)
+    assert len(content) < 6_000_000
+    tracks = data_of(content)['tracks']
+    assert len(tracks) == 150
+    assert {t['t'][-1] for t in tracks} == {round(flight.time, 4)}
+
+
 def test_a_name_cannot_end_the_script(flight):
     name = '</script><script>alert(1)</script>'
     content = page([shown.of_flight(flight, name, METRIC)], name, METRIC)

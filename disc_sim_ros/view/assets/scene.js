@@ -74,7 +74,7 @@ function tube(track, colour, radius) {
     getPointAt(u) { return this.getPoint(u); }
     getTangentAt(u) { return this.getTangent(u); }
   }
-  const segments = Math.min(400, Math.max(8, track.t.length)), around = 6;
+  const segments = Math.ceil(Math.min(400, Math.max(8, track.t.length), Math.max(24, 12000 / tracks.length))), around = 6;
   const mesh = new THREE.Mesh(
     new THREE.TubeGeometry(new Path(), segments, radius, around, false),
     new THREE.MeshBasicMaterial({ color: new THREE.Color(colour) }),
