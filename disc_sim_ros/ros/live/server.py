@@ -3,9 +3,11 @@
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+import ipaddress
 import json
 import os
 import secrets
+import socket
 import threading
 from typing import Any
 
@@ -75,6 +77,8 @@ class LiveServer(threading.Thread):
             raise ConfigError('port', where, f'cannot listen there ({reason}); give another port')
         port = next(iter(self._server.sockets)).getsockname()[1]
         host = f'[{self._address}]' if ':' in self._address else self._address
+        if ipaddress.ip_address(self._address).is_unspecified:  # every interface
+            host = socket.gethostname()
         return f'http://{host}:{port}/#{self.token}'
 
     @property

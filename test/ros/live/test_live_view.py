@@ -113,6 +113,14 @@ def test_a_page_of_another_server_gets_nothing():
         pass
 
 
+def test_the_address_of_all_interfaces_names_the_machine():
+    server = LiveServer('0.0.0.0', 0, PAGE, str)
+    try:
+        assert server.start_serving().startswith(f'http://{socket.gethostname()}:')
+    finally:
+        server.end()
+
+
 def test_only_who_has_the_token_throws():
     thrown = []
 
