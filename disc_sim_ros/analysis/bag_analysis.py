@@ -53,6 +53,7 @@ class Touchdown:
     x: float
     y: float
     spin: float | None
+    z: float = 0.0  # of the centre, on a rim that touches the ground
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +179,11 @@ def _landing(flight: Flight, exact: Reflight | None) -> Touchdown | None:
         landing = exact.landing if exact.landing.flight_time_s <= flight.time[-1] else None
     if landing is not None:
         return Touchdown(
-            landing.flight_time_s, landing.landing_x_m, landing.landing_y_m, landing.spin_rad_s
+            landing.flight_time_s,
+            landing.landing_x_m,
+            landing.landing_y_m,
+            landing.spin_rad_s,
+            _height_at_rest(flight),
         )
     configuration = flight.configuration
     has_ground = configuration is None or configuration.get(Key.GROUND)
@@ -192,6 +197,16 @@ def _landing(flight: Flight, exact: Reflight | None) -> Touchdown | None:
         before = max(int(np.searchsorted(flight.time, time)) - 1, 0)
         spin = frames.flip(float(flight.motion.numbers[before, 12]))
     return Touchdown(time, float(place[0]), float(place[1]), spin)
+
+
+def _height_at_rest(flight: Flight) -> float:
+    """Return z of the centre after a landing on the rim [m]; 0 for one on the centre."""
+    configuration = flight.configuration or {}
+    of_disc = configuration.get(Key.DISC_FILE)
+    contact = configuration.get(Key.GROUND_CONTACT)
+    if contact is None and isinstance(of_disc, dict):
+        contact = of_disc.get('ground')
+    return float(flight.motion.position[-1, 2]) if contact == 'rim' else 0.0
 
 
 def doubts_of(bag: Bag) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ def document(a: Analysis) -> dict[str, Any]:
     end, time, spin = position[-1], float(states.t[-1]), float(states.spin[-1])
     spin_left = None
     if a.landing is not None:
-        end, time = np.array([a.landing.x, a.landing.y, 0.0]), a.landing.time
+        end, time = np.array([a.landing.x, a.landing.y, a.landing.z]), a.landing.time
         if a.landing.spin is not None:
             spin = a.landing.spin
             spin_left = spin / a.release.r if a.release.r else None

@@ -47,6 +47,7 @@ def launch_document(flight: Flight) -> dict[str, Any]:
         'model': setup.model,
         'aero': setup.aero or setup.disc.aero,
         'moment_axes': setup.moment_axes,
+        'ground_contact': setup.lands_on,
         'speed_m_s': launch.speed,
         'pitch_deg': launch.pitch,
         'roll_deg': launch.roll,

@@ -8,7 +8,7 @@ from typing import Any
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import disc_file, flight, launch, theory, thrower
-from disc_sim_ros.physics.disc import AERODYNAMICS
+from disc_sim_ros.physics.disc import AERODYNAMICS, GROUND_CONTACTS
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.kernels.equations import Control
@@ -76,6 +76,13 @@ def add_disc(p: Parser, *, several: bool = False) -> None:
         choices=tuple(flight.MOMENT_AXES),
         default=flight.Setup.moment_axes,
         help='axes in which the moment coefficients act: 3 (body) or 4 (wind)',
+    )
+    what.add_argument(
+        '--ground',
+        choices=GROUND_CONTACTS,
+        default=argparse.SUPPRESS,
+        help='what touches the ground: the centre, as in the paper, or the rim '
+        "(default: the disc's own)",
     )
     add_quantity(what, '--step', STEP)
 
@@ -173,6 +180,7 @@ def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
             seed=chosen.seed,
         ),
         step=chosen.step,
+        ground_contact=getattr(chosen, 'ground', None),
     )
     return launch.Launch(**values), setup
 
@@ -259,6 +267,7 @@ def parameters(
         'model': setup.model,
         'aero': setup.aero or '',
         'moment_axes': setup.moment_axes,
+        'ground_contact': setup.ground_contact or '',
         'physics_rate': rate,
         'publish_rate': rate / math.ceil(rate / PUBLISH_RATE),
         **{PARAMETER_OF[name]: value for name, value in quantities.items()},

@@ -15,6 +15,7 @@ from disc_sim_ros.physics.disc_checks import check_body, check_number
 from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO
 
 AERODYNAMICS = ('table', 'linear')
+GROUND_CONTACTS = ('centre', 'rim')
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -155,6 +156,7 @@ class Disc:
     C_Mq: float = DAMPING['C_Mq'].default  # pitch damping, per q c / (2 V)
     C_Nr: float = DAMPING['C_Nr'].default  # spin damping, per r c / (2 V)
     aero: str = 'table'  # the coefficients used unless a Setup names others
+    ground_contact: str = 'centre'  # what touches the ground unless a Setup names another
     table: AeroTable | None = None
     linear: LinearAero | None = None
     spin_roll_moment: SpinTable | None = None  # rolling moment in axes 3
@@ -171,6 +173,7 @@ class Disc:
             quantity.check(getattr(self, name))
         check_body(**{name: getattr(self, name) for name in DISC})
         validation.choice('aero', self.aero, AERODYNAMICS)
+        validation.choice('ground', self.ground_contact, GROUND_CONTACTS)
         if not self.has(self.aero):
             held = [kind for kind in AERODYNAMICS if self.has(kind)]
             allowed = f'disc {self.name} holds {" and ".join(held) or "no"} coefficients'

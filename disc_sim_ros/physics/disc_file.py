@@ -19,7 +19,14 @@ import yaml
 from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError, brief
 from disc_sim_ros.physics import flight_numbers
-from disc_sim_ros.physics.disc import AERODYNAMICS, AeroTable, Disc, LinearAero, SpinTable
+from disc_sim_ros.physics.disc import (
+    AERODYNAMICS,
+    GROUND_CONTACTS,
+    AeroTable,
+    Disc,
+    LinearAero,
+    SpinTable,
+)
 from disc_sim_ros.physics.disc_checks import check_number
 from disc_sim_ros.quantities import DAMPING, DISC, LINEAR_AERO, VARIED
 from disc_sim_ros.validation import Quantity
@@ -55,7 +62,7 @@ _BUILDERS: dict[str, Callable[..., Any]] = {
     'spin_roll_moment': SpinTable.of,
     'spin_side_force': SpinTable.of,
 }
-_KEYS = ('description', 'based_on', 'flight_numbers', 'aero', *_PROPERTIES, *_SECTIONS)
+_KEYS = ('description', 'based_on', 'flight_numbers', 'aero', 'ground', *_PROPERTIES, *_SECTIONS)
 _OPTIONAL = {DISC['area'].key, *_DAMPING, *_UNCERTAIN}
 
 
@@ -97,6 +104,8 @@ def disc_document(disc: Disc) -> dict[str, Any]:
     `disc_from_document` makes the same disc from it, to the last bit.
     """
     document: dict[str, Any] = {'description': disc.description, 'aero': disc.aero}
+    if disc.ground_contact != Disc.ground_contact:
+        document['ground'] = disc.ground_contact
     document |= _numbers_of(disc, _PROPERTIES)
     document['damping'] = _numbers_of(disc, _DAMPING)
     if disc.linear is not None:
@@ -264,6 +273,8 @@ def _disc(name: str, keys: dict[str, Any], source: str) -> Disc:
                 fields.update(_section(section, keys[section], names))
         aero = 'table' if 'table' in keys else 'linear'
         fields['aero'] = validation.choice('aero', keys.get('aero', aero), AERODYNAMICS)
+        ground = keys.get('ground', Disc.ground_contact)
+        fields['ground_contact'] = validation.choice('ground', ground, GROUND_CONTACTS)
         return Disc(**fields)
     except ConfigError as error:
         key = DISC[error.quantity].key if error.quantity in DISC else error.thing

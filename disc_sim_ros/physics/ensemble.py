@@ -27,6 +27,7 @@ from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import DURATION, LAUNCH, VARIED
 
 # A thread takes as many flights at a time as it flies in about 0.1 s, so that Ctrl-C acts soon.
+_ON_GROUND = 1e-8  # m; a landing is located to 1e-9 s
 _CHUNK = 2e6  # steps
 _USUAL_FLIGHT = 10.0  # s; most are shorter
 _LONGEST_CHUNK = 4096  # flights
@@ -64,8 +65,9 @@ class Landings:
 
     @property
     def z(self) -> FloatArray:
-        """Return z of each end, up [m]; 0 where it landed."""
-        return np.where(self.status == LANDED, 0.0, frames.flip(self.states[:, 2]))
+        """Return z of the centre at each end, up [m]; 0 where it landed on its centre."""
+        z = frames.flip(self.states[:, 2])
+        return np.where((self.status == LANDED) & (np.abs(z) < _ON_GROUND), 0.0, z)
 
     @property
     def range(self) -> FloatArray:
@@ -105,7 +107,8 @@ def fly_many(
         control: Control inputs of all, held for the whole flight.
         seeds: Seeds of the gusts, shape (n,); None for that of `setup` in every flight.
         duration: Longest time of flight [s].
-        ground: End where the centre crosses z = 0 from above; else fly for `duration`.
+        ground: End where the centre or the rim (`Setup.ground_contact`) crosses z = 0 from above;
+            else fly for `duration`.
         threads: Number of threads; None for one per core.
 
     Returns:

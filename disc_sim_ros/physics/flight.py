@@ -11,7 +11,7 @@ from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError, IntegrationError
 from disc_sim_ros.physics import frames
-from disc_sim_ros.physics.disc import AERODYNAMICS, Disc
+from disc_sim_ros.physics.disc import AERODYNAMICS, GROUND_CONTACTS, Disc
 from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.kernels import integrator, rotation
 from disc_sim_ros.physics.kernels.aerodynamics import Linear
@@ -51,6 +51,8 @@ class Setup:
         air: Density and gravity.
         wind: Wind and turbulence.
         step: Integration step [s].
+        ground_contact: What touches the ground: 'centre' (the paper) or 'rim'; None for the
+            disc's own.
 
     Raises:
         ConfigError: A name is unknown, or the disc has no aerodynamics of this kind.
@@ -63,16 +65,24 @@ class Setup:
     air: Air = field(default_factory=Air)
     wind: Wind = field(default_factory=Wind)
     step: float = STEP.default
+    ground_contact: str | None = None
 
     def __post_init__(self) -> None:
         validation.choice('model', self.model, MODELS)
         validation.choice('moment_axes', self.moment_axes, MOMENT_AXES)
         STEP.check(self.step)
+        if self.ground_contact is not None:
+            validation.choice('ground_contact', self.ground_contact, GROUND_CONTACTS)
         if self.aero is not None:
             validation.choice('aero', self.aero, AERODYNAMICS)
             if not self.disc.has(self.aero):
                 allowed = f'disc {self.disc.name} has no such coefficients'
                 raise ConfigError('aero', self.aero, allowed)
+
+    @property
+    def lands_on(self) -> str:
+        """Return what touches the ground: 'centre' or 'rim'."""
+        return self.ground_contact or self.disc.ground_contact
 
     @cached_property
     def plant(self) -> Plant:
@@ -95,6 +105,7 @@ class Setup:
             line=_line(disc),
             table=disc.table_rows,
             spin_terms=disc.spin_terms,
+            rim=0.5 * float(disc.diameter) if self.lands_on == 'rim' else 0.0,
         )
 
     def check_step(self, spin: float, speed: float) -> None:
@@ -181,9 +192,13 @@ class Flight:
 
     @property
     def position(self) -> FloatArray:
-        """Return the position at the end in `map` axes [m], shape (3,); a landing has z = 0."""
+        """Return the position at the end in `map` axes [m], shape (3,).
+
+        A landing has z = 0, or the height of the centre above the lowest point of the rim.
+        """
         x, y, z = frames.map_from_paper(self.end[:3])
-        return np.array([x, y, 0.0 if self.landed else z]) + 0.0  # no minus zeros
+        on_centre = self.landed and self.setup.lands_on == 'centre'
+        return np.array([x, y, 0.0 if on_centre else z]) + 0.0  # no minus zeros
 
     @property
     def range(self) -> float:
@@ -213,7 +228,8 @@ def fly(
         setup: The disc, the model, the air and the step.
         control: Control inputs, held for the whole flight.
         duration: Longest time of flight [s].
-        ground: End where the centre crosses z = 0 from above; else fly for `duration`.
+        ground: End where the centre or the rim (`Setup.ground_contact`) crosses z = 0 from above;
+            else fly for `duration`.
         sample_rate: Samples per second of the trajectory [1/s]; 0 for none.
 
     Returns:

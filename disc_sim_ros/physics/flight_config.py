@@ -49,6 +49,7 @@ class Key:
     AIR_DENSITY = 'air_density'
     GRAVITY = 'gravity'
     WIND = 'wind'
+    GROUND_CONTACT = 'ground_contact'  # only where it is not the disc's own
 
 
 _REQUIRED = {Key.DISC, Key.MODEL, Key.PHYSICS_RATE, Key.PUBLISH_RATE, Key.GROUND}
@@ -106,6 +107,8 @@ def configuration_text(config: FlightConfig) -> str:
             **{name: x for name, x in asdict(setup.wind).items() if name != 'mean'},
         },
     }
+    if setup.ground_contact is not None:
+        document[Key.GROUND_CONTACT] = setup.ground_contact
     text: str = yaml.dump(document, Dumper=_Dumper, sort_keys=False, width=10_000)
     return text
 
@@ -156,6 +159,7 @@ def _from_document(document: Mapping[str, Any]) -> FlightConfig:
         air=Air(density=document[Key.AIR_DENSITY], gravity=document[Key.GRAVITY]),
         wind=Wind(mean=frames.flip_yz((x, y, z)), **wind),
         step=1.0 / rate,
+        ground_contact=document.get(Key.GROUND_CONTACT),
     )
     publish_rate = document[Key.PUBLISH_RATE]
     timeout = document.get(Key.COMMAND_TIMEOUT)

@@ -153,6 +153,7 @@ def keys(numbers: tuple[float, ...], keys_of: Keys) -> dict[str, Any]:
         'inertia_axial_kg_m2': float(shape[0]) * MASS * DIAMETER**2,
         'inertia_diametral_kg_m2': float(shape[1]) * MASS * DIAMETER**2,
         'aero': 'table',
+        'ground': 'rim',
         'damping': dict(other['damping']),
         'table': {name: column.tolist() for name, column in columns.items()},
         'uncertainty': {

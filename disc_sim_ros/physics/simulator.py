@@ -36,7 +36,7 @@ class FlightSimulator:
 
     Attributes:
         setup: The disc, its surroundings and the integration; its wind is the present one.
-        ground: True if the flight ends where z = 0 is crossed from above.
+        ground: True if the flight ends where the centre or the rim crosses z = 0 from above.
         release: State at release.
         steps: Steps since the release, also after the landing.
         landed: True if the disc lies on the ground.
@@ -150,7 +150,8 @@ class FlightSimulator:
             self.touch_time = t
             self.touch = State(*self._landing.tolist())
             # At rest where it landed, without velocity and rates, in the attitude of the landing.
-            self._state = self.touch._replace(Z=0.0, VX=0.0, VY=0.0, VZ=0.0, p=0.0, q=0.0, r=0.0)
+            Z = self.touch.Z if self.setup.lands_on == 'rim' else 0.0
+            self._state = self.touch._replace(Z=Z, VX=0.0, VY=0.0, VZ=0.0, p=0.0, q=0.0, r=0.0)
         else:
             self._state = State(*self._flight[1 : 1 + STATE_SIZE].tolist())
         if status == LOST:

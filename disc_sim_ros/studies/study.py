@@ -58,7 +58,7 @@ class Study:
         gusts: 'each': sample k flies in the gusts of seed `setup.wind.seed` + k; 'same': all
             flights fly in the gusts of seed `setup.wind.seed`.
         duration: Longest time of flight [s].
-        ground: True to end a flight where the centre of the disc crosses z = 0.
+        ground: True to end a flight where the centre or the rim of the disc crosses z = 0.
 
     Raises:
         ConfigError: A value is out of range, or two of them contradict each other.
@@ -334,6 +334,7 @@ def study_document(study: Study) -> dict[str, Any]:
         'step': setup.step,
         'duration': study.duration,
         'ground': study.ground,
+        'ground_contact': setup.lands_on,
         'fixed': fixed,
         'vary': {name: [float(x) for x in values] for name, values in study.vary.items()},
         'scatter': {

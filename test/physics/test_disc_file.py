@@ -148,7 +148,15 @@ def test_the_frisbee_has_a_tenth_of_the_printed_roll_and_pitch_damping():
 
 
 def test_the_ultrastar_has_the_steady_coefficients_and_the_roll_moment_of_the_frisbee():
-    own = ('mass', 'diameter', 'area', 'inertia_axial', 'inertia_diametral', *DAMPINGS)
+    own = (
+        'mass',
+        'diameter',
+        'area',
+        'inertia_axial',
+        'inertia_diametral',
+        'ground_contact',
+        *DAMPINGS,
+    )
     base = disc_file.load_disc('frisbee_roll_moment')
     assert_same_disc(disc_file.load_disc('ultrastar'), base, but=own)
 

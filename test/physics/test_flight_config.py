@@ -145,7 +145,9 @@ def test_the_bits_are_compared():
 
 def test_the_document_has_the_keys_and_the_axes_of_map():
     wind = Wind(mean=(1.0, 2.0, 3.0))
-    text = flight_config.configuration_text(config(Setup(disc=FRISBEE, wind=wind)))
+    text = flight_config.configuration_text(
+        config(Setup(disc=FRISBEE, wind=wind, ground_contact='rim'))
+    )
     document = yaml.safe_load(text)
     assert list(document) == [value for name, value in vars(Key).items() if name.isupper()]
     assert document[Key.VERSION] == __version__

@@ -65,7 +65,7 @@ def test_the_compiled_loop_has_a_column_for_each_varied_quantity_in_this_order()
             Disc,
             DISC | DAMPING,
             {'name', 'description', 'aero', 'table', 'linear', 'spin_roll_moment',
-             'spin_side_force', 'uncertainty'},
+             'spin_side_force', 'uncertainty', 'ground_contact'},
         ),
     ],
 )  # fmt: skip

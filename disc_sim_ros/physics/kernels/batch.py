@@ -17,7 +17,7 @@ from disc_sim_ros.physics.kernels.integrator import (
     integrate_from,
 )
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
-from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, rk4_step, top
+from disc_sim_ros.physics.kernels.rk4 import Inputs, depth, is_sound, rk4_step, top
 from disc_sim_ros.physics.kernels.rotation import cos_sin_degrees
 from disc_sim_ros.physics.kernels.rows import NAMES, YAW, fill_table, inputs_of, plant_of, release
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
@@ -161,6 +161,10 @@ def fly_simd(
         plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
         next_s = rk4_step(s, step, _NO_GUST, _NO_GUST, plants, all_inputs)
         goes_on = is_sound(next_s, step, plants) & (next_s.Z <= lowest) & (k < whole)  # noqa: SIM300
+        if options.ground and plant.rim > 0.0:
+            clear = depth(next_s, plant.rim) <= 0.0
+            never_clear = depth(s, plant.rim) > 0.0
+            goes_on = goes_on & (clear | never_clear)
         ending = where(goes_on, 0.0, element(a.active, 0))
         change = any_of(ending > 0.0)
         if change:

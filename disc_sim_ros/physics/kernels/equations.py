@@ -73,6 +73,7 @@ class Plant(NamedTuple):
     line: Linear
     table: FloatArray  # steady coefficients, see `aerodynamics.table_coefficients`
     spin_terms: FloatArray  # see `aerodynamics.spin_coefficients`; empty if the disc has none
+    rim: float  # m, radius of the rim that touches the ground; 0 where the centre does
 
 
 class Velocity(NamedTuple):

@@ -17,7 +17,15 @@ from disc_sim_ros.physics.kernels.equations import (
     moment,
 )
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
-from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, lerp, rk4_step, top, touchdown
+from disc_sim_ros.physics.kernels.rk4 import (
+    Inputs,
+    is_sound,
+    lerp,
+    rk4_step,
+    top,
+    touchdown,
+    touches,
+)
 from disc_sim_ros.physics.kernels.wind import (
     GUST_INTERVAL,
     GustFilter,
@@ -37,7 +45,7 @@ class Options(NamedTuple):
 
     step: float  # s
     duration: float  # longest time of flight [s]
-    ground: bool  # end where Z = 0 is crossed from above
+    ground: bool  # end where the centre or the rim crosses Z = 0 from above
     sample_rate: float  # 1/s
 
 
@@ -146,7 +154,7 @@ def integrate_from(
         next_s, next_gust = x.state, x.gust
         if not is_sound(next_s, step, plant):
             return IntegrationResult(LOST, t, s, apex_Z, written)
-        landed = options.ground and next_s.Z > 0.0
+        landed = options.ground and touches(s, next_s, plant)
         if landed:
             h, next_gust, next_s = touchdown(s, h, next_s, gust, next_gust, plant, inputs)
             next_t = t + h
@@ -216,7 +224,7 @@ def advance_steps(
         wind: Wind of the flight.
         noise: Gust noise, see `Inputs`.
         step: Integration step [s].
-        ground: End where Z = 0 is crossed from above.
+        ground: End where the centre or the rim crosses Z = 0 from above.
         landing: Filled with the state at the landing, shape (14,).
 
     Returns:
@@ -234,7 +242,7 @@ def advance_steps(
             status = LOST
             t = x.steps * step
             break
-        if ground and after.state.Z > 0.0:
+        if ground and touches(x.state, after.state, plant):
             h, _, s = touchdown(x.state, step, after.state, x.gust, after.gust, plant, inputs)
             for i in range(STATE_SIZE):
                 landing[i] = s[i]

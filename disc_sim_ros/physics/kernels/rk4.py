@@ -14,6 +14,7 @@ from disc_sim_ros.physics.kernels.equations import (
     derivative,
 )
 from disc_sim_ros.physics.kernels.jit import inline, jit
+from disc_sim_ros.physics.kernels.rotation import rotation_elements
 from disc_sim_ros.physics.kernels.wind import WindData, wind_at
 
 STABLE = 2.78  # largest step times rate, of a decay or an oscillation, that stays bounded
@@ -91,6 +92,39 @@ def is_sound(s: State, h: float, plant: Plant) -> bool:
     return (abs(total + s.sigma) < math.inf) & (fastest * h <= STABLE)
 
 
+@inline
+def depth(s: State, rim: float) -> float:
+    """Return Z (down) of the lowest point of a rim of a radius [m]; of the centre for 0."""
+    Z = s.Z
+    if rim > 0.0:
+        _, _, _, _, _, _, zx, zy, _ = rotation_elements(s.e0, s.e1, s.e2, s.e3)
+        Z = Z + rim * math.sqrt(zx * zx + zy * zy)
+    return Z
+
+
+@inline
+def _sinking(s: State, rim: float) -> float:
+    """Return the rate of change of `depth` [m/s]."""
+    VZ = s.VZ
+    if rim > 0.0:
+        _, _, _, _, _, _, zx, zy, zz = rotation_elements(s.e0, s.e1, s.e2, s.e3)
+        tilt = math.sqrt(zx * zx + zy * zy)  # its sine
+        if tilt > 0.0:
+            VZ += rim * zz * (zy * s.p - zx * s.q) / tilt
+    return VZ
+
+
+@inline
+def touches(s: State, end: State, plant: Plant) -> bool:
+    """Return True if the disc comes to the ground in a step.
+
+    A rim counts once it was clear of the ground, so that a tilted disc may be released with its
+    centre at the ground; before, the centre counts.
+    """
+    rim_touches = (depth(end, plant.rim) > 0.0) & (depth(s, plant.rim) <= 0.0)
+    return (end.Z > 0.0) | rim_touches
+
+
 _TOLERANCE = 1e-12  # s; a thousandth of the promised 1e-9 s
 
 
@@ -104,7 +138,7 @@ def touchdown(
     plant: Plant,
     inputs: Inputs,
 ) -> tuple[float, Velocity, State]:
-    """Find where a step crosses the ground, Z = 0.
+    """Find where the centre or the rim crosses the ground, Z = 0, in a step; see `touches`.
 
     Newton's method on the length of a shorter step from `s`. It starts at the root of the cubic
     through both ends, and bisects where an iterate leaves the bracket. A release on the ground is
@@ -122,25 +156,29 @@ def touchdown(
     Returns:
         Time from the beginning of the step [s], and gust and state then.
     """
+    rim = plant.rim if depth(s, plant.rim) <= 0.0 else 0.0
+    start_Z, end_Z = depth(s, rim), depth(end, rim)
+    start_V, end_V = _sinking(s, rim), _sinking(end, rim)
     a, b = 0.0, h
-    if s.Z >= 0.0:
+    if start_Z >= 0.0:
         a = 1e-6 * h
         a_gust = lerp(gust, next_gust, a / h)
-        if rk4_step(s, a, gust, a_gust, plant, inputs).Z >= 0.0:
+        if depth(rk4_step(s, a, gust, a_gust, plant, inputs), rim) >= 0.0:
             return 0.0, gust, s
-    f = s.Z / (s.Z - end.Z)
+    f = start_Z / (start_Z - end_Z)
     for _ in range(3):
-        Z, slope, _ = cubic(s, end, h, f)
+        Z, slope, _ = cubic(start_Z, start_V, end_Z, end_V, h, f)
         f -= Z / slope if slope != 0.0 else 0.0
     next_x = f * h
     for _ in range(100):
         x = next_x if a < next_x < b else 0.5 * (a + b)
         x_gust = lerp(gust, next_gust, x / h)
         x_s = rk4_step(s, x, gust, x_gust, plant, inputs)
-        next_x = x - x_s.Z / x_s.VZ if x_s.VZ != 0.0 else a
-        if x_s.Z == 0.0 or abs(next_x - x) < _TOLERANCE or b - a < _TOLERANCE:
+        Z, V = depth(x_s, rim), _sinking(x_s, rim)
+        next_x = x - Z / V if V != 0.0 else a
+        if Z == 0.0 or abs(next_x - x) < _TOLERANCE or b - a < _TOLERANCE:
             break
-        if x_s.Z > 0.0:
+        if Z > 0.0:
             b = x
         else:
             a = x
@@ -148,12 +186,23 @@ def touchdown(
 
 
 @inline
-def cubic(s: State, end: State, h: float, f: float) -> tuple[float, float, float]:
-    """Return Z and its two derivatives at the fraction `f` of a step, on the cubic of its ends."""
-    rise, start, stop = end.Z - s.Z, h * s.VZ, h * end.VZ
+def cubic(
+    start_Z: float, start_V: float, end_Z: float, end_V: float, h: float, f: float
+) -> tuple[float, float, float]:
+    """Return Z and its two derivatives at the fraction `f` of a step, on the cubic of its ends.
+
+    Args:
+        start_Z: Z at the beginning [m].
+        start_V: Its rate of change there [m/s].
+        end_Z: Z at the end [m].
+        end_V: Its rate of change there [m/s].
+        h: Length of the step [s].
+        f: Fraction of the step.
+    """
+    rise, start, stop = end_Z - start_Z, h * start_V, h * end_V
     c2 = 3.0 * rise - 2.0 * start - stop
     c3 = start + stop - 2.0 * rise
-    Z = s.Z + f * (start + f * (c2 + f * c3))
+    Z = start_Z + f * (start + f * (c2 + f * c3))
     return Z, start + f * (2.0 * c2 + f * 3.0 * c3), 2.0 * c2 + f * 6.0 * c3
 
 
@@ -161,6 +210,6 @@ def cubic(s: State, end: State, h: float, f: float) -> tuple[float, float, float
 def top(s: State, end: State, h: float) -> float:
     """Return the least Z (down) in a step in which VZ changes from up to down."""
     f = s.VZ / (s.VZ - end.VZ)
-    _, slope, curvature = cubic(s, end, h, f)
-    Z, _, _ = cubic(s, end, h, f - slope / curvature)
+    _, slope, curvature = cubic(s.Z, s.VZ, end.Z, end.VZ, h, f)
+    Z, _, _ = cubic(s.Z, s.VZ, end.Z, end.VZ, h, f - slope / curvature)
     return Z

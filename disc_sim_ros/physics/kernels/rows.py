@@ -123,6 +123,7 @@ def plant_of(row: FloatArray, plant: Plant, table: FloatArray) -> Plant:
         ),
         table,
         plant.spin_terms,
+        plant.rim,
     )
 
 

@@ -57,7 +57,7 @@ class SimConfig:
         command_timeout: Simulated time after which a command falls to zero.
         auto_throw: Whether the node throws as soon as it is ready.
         throw_period: Time from release to release; 0 is one throw.
-        ground: Whether a flight ends where the centre of the disc crosses z = 0.
+        ground: Whether a flight ends on the ground.
         frame_prefix: Prefix of the names of the frames.
         path_rate: Points of `path` a second; 0 is none.
         realtime_priority: SCHED_FIFO priority of the simulation thread; 0 is none.
@@ -119,6 +119,7 @@ def _configuration(v: Mapping[str, Any]) -> SimConfig:
         air=Air(density=v['air_density'], gravity=v['gravity']),
         wind=_wind_of(**_group(v, 'wind')),
         step=1.0 / v['physics_rate'],
+        ground_contact=v['ground_contact'] or None,
     )
     launch = Launch(**_group(v, 'launch'))
     setup.check_step(launch.spin, launch.speed)

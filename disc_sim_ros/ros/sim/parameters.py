@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from disc_sim_ros.physics.disc import AERODYNAMICS
+from disc_sim_ros.physics.disc import AERODYNAMICS, GROUND_CONTACTS
 from disc_sim_ros.physics.disc_file import DEFAULT_DISC
 from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, Setup
 from disc_sim_ros.quantities import AIR, IMU, LAUNCH, TIMING, WIND
@@ -74,7 +74,14 @@ GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
             'ground',
             default=True,
             effect='next throw',
-            meaning='End a flight where the centre of the disc crosses z = 0 from above.',
+            meaning='End a flight where the disc crosses z = 0 from above.',
+        ),
+        ParameterSpec(
+            'ground_contact',
+            '',
+            'next throw',
+            "What touches the ground: centre (the paper) or rim; empty: the disc's own.",
+            choices=('', *GROUND_CONTACTS),
         ),
     ),
     'Launch': tuple(_launch()),
