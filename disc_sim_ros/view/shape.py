@@ -52,7 +52,7 @@ def _turned(sectors: list[int]) -> trimesh.Trimesh:
     radius, height = np.array(_PROFILE).T
     # The outward normal of each edge of the profile; corners take the mean of their edges.
     edges = np.diff(np.array(_PROFILE), axis=0)
-    sides = np.column_stack([-edges[:, 1], edges[:, 0]])
+    sides = edges @ np.array([[0.0, 1.0], [-1.0, 0.0]])  # a quarter turn to the left
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)
     corners = np.vstack([[0.0, 1.0], sides[:-1] + sides[1:], [0.0, -1.0]])
     corners /= np.linalg.norm(corners, axis=1, keepdims=True)

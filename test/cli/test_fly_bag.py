@@ -114,5 +114,6 @@ def test_make_fly_also_works_without_ros(tmp_path):
     program('.venv/bin/python', 'exit 1')
     note, _, called = make_fly().partition('\n')
     assert note.startswith('fly: .venv has no ROS 2')
-    assert called.startswith('fly<--plot><flights/fig5.png><--disc><my disc><--speed><25>')
+    files = '<--plot><flights/fig5.png><--html><flights/fig5.html>'
+    assert called.startswith(f'fly{files}<--disc><my disc><--speed><25>')
     assert (tmp_path / 'flights').is_dir()

@@ -118,7 +118,12 @@ def test_defaults_are_the_throw_of_fig_5():
 def test_every_parameter_reaches_the_configuration():
     """A changed value must change the configuration: no parameter may be dropped."""
     words = {'disc': 'ultrastar', 'model': 'precession', 'moment_axes': 'wind', 'aero': 'linear'}
-    words |= {'frame_prefix': 'red/', 'publish_rate': 100.0, 'physics_rate': 2000.0}
+    words |= {
+        'frame_prefix': 'red/',
+        'ground_contact': 'rim',
+        'publish_rate': 100.0,
+        'physics_rate': 2000.0,
+    }
     for spec in TABLE:
         value = words.get(spec.name)
         if value is None:

@@ -154,10 +154,12 @@ def test_a_simulator_that_ends_delivers_its_last_messages(ros, record):
     recorder.process.send_signal(signal.SIGCONT)
     assert sim.wait() == 0
     assert recorder.end() == 0
-    assert 'nothing lost' in recorder.log.splitlines()[-1]
+    kept = ['/odom', '/pose', '/spin_rate', '/aero_wrench']
+    # Latched topics keep one message: a newer one may replace it before a stopped reader has it.
+    assert [name for name in kept if f'{name}:' in recorder.log.splitlines()[-1]] == []
     bag = open_bag(recorder.bag)
     ends = {}
-    for message in bag.raw(['/odom', '/pose', '/spin_rate', '/aero_wrench']):
+    for message in bag.raw(kept):
         ends[message.topic] = message.publish_time
     assert max(ends.values()) - min(ends.values()) < 1_000_000, 'all end with the same step'
 
