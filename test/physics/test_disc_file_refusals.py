@@ -12,6 +12,7 @@ from physics.disc_files import COLUMNS, yaml_of
 
 FRISBEE = yaml_of('frisbee')
 AFTER = FRISBEE.count('\n') + 1  # the line that follows it
+AFTER_C_MQ = FRISBEE[: FRISBEE.index('  C_Mq: -0.140')].count('\n') + 2
 ROLL_MOMENT = """based_on: frisbee
 spin_roll_moment:
   advance_ratio: [0, 1]
@@ -72,7 +73,7 @@ REFUSED = {
     'doubled key': (FRISBEE + 'mass_kg: 0.2\n', [f'line {AFTER}', 'repeated key mass_kg']),
     'doubled key in a section': (
         frisbee('  C_Mq: -0.140', '  C_Mq: -0.140\n  C_Mq: -0.140'),
-        ['line 16', 'repeated key C_Mq'],
+        [f'line {AFTER_C_MQ}', 'repeated key C_Mq'],
     ),
     'no mass': (frisbee('mass_kg: 0.175', ''), ['mass_kg', 'the key is missing']),
     'no diameter': (frisbee('diameter_m: 0.275', ''), ['diameter_m', 'the key is missing']),
