@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from disc_sim_ros.physics.disc_file import disc_names
+from disc_sim_ros.physics.disc_file import disc_names, load_disc
 from docs import disc_rows
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'discs.md').read_text(encoding='utf-8')
@@ -24,6 +24,8 @@ def test_each_disc_file_says_what_it_was_compared_with():
             encoding='utf-8'
         )
         assert re.search('^# Compared with: .{20,}$', text, re.MULTILINE), name
+        if load_disc(name).ground_contact == 'rim':  # a real disc
+            assert re.search('^# Uncertainty: .{20,}$', text, re.MULTILINE), name
 
 
 def test_each_disc_of_the_catalogue_is_named():
