@@ -208,7 +208,7 @@ def _checked_columns(
     launches: Mapping[str, ArrayLike], setup: Setup, control: Control, *, ground: bool
 ) -> dict[str, FloatArray]:
     """Return a checked column for each of NAMES, of shape (n,) or ()."""
-    columns = {name: np.array(x) for name, x in _defaults(setup, control).items()}
+    columns = {name: np.array(x) for name, x in defaults(setup, control).items()}
     for name, values in launches.items():
         validation.choice('launches', name, NAMES)
         try:
@@ -275,7 +275,7 @@ def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
         raise ConfigError('step', setup.step, allowed, 'step')
 
 
-def _defaults(setup: Setup, control: Control) -> dict[str, float]:
+def defaults(setup: Setup, control: Control) -> dict[str, float]:
     """Return the default of each of NAMES."""
     wind = (frames.map_from_paper(setup.wind.mean) + 0.0).tolist()
     plant = setup.plant

@@ -189,7 +189,7 @@ def changed(name: str, value: float) -> Setup:
 )
 def test_a_constant_that_differs_between_flights_acts_as_in_a_setup(name, value):
     setup = Setup(disc=FRISBEE, step=STEP)
-    default = ensemble._defaults(setup, Control())[name]
+    default = ensemble.defaults(setup, Control())[name]
     landings = fly_many({name: [default, value]}, setup)
     plain, other = fly(Launch(), setup).end, fly(Launch(), changed(name, value)).end
     assert tuple(landings.states[0].tolist()) == plain

@@ -157,7 +157,7 @@ def fly_simd(
                 _fill_lane(a, lane, started, row, table, x.state)
                 started += 1
 
-        s, k, apex_Zs = _load_state(a.state), element(a.steps, 0), element(a.apex_Z, 0)
+        s, k, apex_Zs = load_state(a.state), element(a.steps, 0), element(a.apex_Z, 0)
         plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
         next_s = rk4_step(s, step, _NO_GUST, _NO_GUST, plants, all_inputs)
         goes_on = is_sound(next_s, step, plants) & (next_s.Z <= lowest) & (k < whole)  # noqa: SIM300
@@ -168,7 +168,7 @@ def fly_simd(
         ending = where(goes_on, 0.0, element(a.active, 0))
         change = any_of(ending > 0.0)
         if change:
-            next_s = _select(goes_on, next_s, s)
+            next_s = select(goes_on, next_s, s)
             store(a.ending, 0, ending)
         over_the_top = (s.VZ < 0.0) & (next_s.VZ >= 0.0)
         if any_of(over_the_top):
@@ -231,7 +231,7 @@ def _lane(a: LaneState, lane: int) -> IntegratorState:
 
 
 @inline
-def _load_state(a: FloatArray) -> State:
+def load_state(a: FloatArray) -> State:
     """Return the states in all lanes, shape (14, WIDTH), as vectors."""
     return State(
         element(a, 0),
@@ -252,7 +252,7 @@ def _load_state(a: FloatArray) -> State:
 
 
 @inline
-def _select(condition: Any, a: State, b: State) -> State:
+def select(condition: Any, a: State, b: State) -> State:
     """Return the state `a` in the lanes where the condition holds, else `b`."""
     return State(
         where(condition, a.X, b.X),

@@ -1,0 +1,1 @@
+"""Estimation: from measured flights to a disc (identification) and to a landing (prediction)."""
