@@ -22,6 +22,7 @@ __all__ = [
     'Bag',
     'BagError',
     'BagWriter',
+    'BatchSimulator',
     'ConfigError',
     'Control',
     'DamageError',
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
         InterruptedSweepError,
         WriteError,
     )
+    from disc_sim_ros.physics.batch_simulator import BatchSimulator
     from disc_sim_ros.physics.disc import AeroTable, Disc, LinearAero, SpinTable
     from disc_sim_ros.physics.disc_file import disc_names, load_disc
     from disc_sim_ros.physics.ensemble import Landings, fly_many
@@ -107,6 +109,7 @@ else:  # type checkers do not see this function, and so report a misspelt name
             'InterruptedSweepError',
             'WriteError',
         ),
+        'physics.batch_simulator': ('BatchSimulator',),
         'physics.disc': ('AeroTable', 'Disc', 'LinearAero', 'SpinTable'),
         'physics.disc_file': ('disc_names', 'load_disc'),
         'physics.ensemble': ('Landings', 'fly_many'),
