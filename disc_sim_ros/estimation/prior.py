@@ -1,0 +1,110 @@
+"""What is known of a throw before it is measured: how people throw, the wind, and the disc."""
+
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation.local import disc_axis
+from disc_sim_ros.physics.disc import Disc
+
+# Standard deviations of the offsets of a disc whose file states none: about as discs of one kind
+# differ in one wind tunnel (docs/discs.md).
+DISC_OFFSETS = {'lift_offset': 0.02, 'drag_offset': 0.008, 'pitching_offset': 0.003}
+ROLLING_OFFSET = 0.002  # the same of the rolling moment, which a file cannot state
+_HORIZONTAL = 1e-3  # share of the speed below which a path counts as vertical
+
+
+@dataclass(frozen=True, slots=True)
+class Gaussian:
+    """A mean and a standard deviation; a standard deviation of 0 is exact knowledge."""
+
+    mean: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.mean):
+            raise ConfigError('mean', self.mean, 'give a finite number')
+        if not (math.isfinite(self.sigma) and self.sigma >= 0.0):
+            raise ConfigError('sigma', self.sigma, 'give a finite number of at least 0')
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ThrowPrior:
+    """A throw before its first measurement; independent normal distributions.
+
+    Attributes:
+        speed: Speed over the ground [m/s].
+        climb: Angle of the velocity above the horizontal [rad].
+        nose: Angle of the disc above its velocity over the ground [rad].
+        bank: Tilt of the disc about its velocity, right edge down positive [rad].
+        rate: Angular velocity about x and y of the disc, each [rad/s].
+        spin: Spin rate, clockwise from above positive [rad/s].
+        wind_x: Velocity of the air along x of `map` [m/s].
+        wind_y: Velocity of the air along y of `map` [m/s].
+        offsets: What is added to the coefficients of the disc: columns of an ensemble.
+    """
+
+    speed: Gaussian = Gaussian(17.0, 4.0)
+    climb: Gaussian = Gaussian(math.radians(12.0), math.radians(8.0))
+    nose: Gaussian = Gaussian(math.radians(4.0), math.radians(4.0))
+    bank: Gaussian = Gaussian(0.0, math.radians(12.0))
+    rate: Gaussian = Gaussian(0.0, 2.0)
+    spin: Gaussian = Gaussian(60.0, 15.0)
+    wind_x: Gaussian = Gaussian(0.0, 2.0)
+    wind_y: Gaussian = Gaussian(0.0, 2.0)
+    offsets: dict[str, Gaussian] = field(default_factory=dict)
+
+    @property
+    def constants(self) -> dict[str, Gaussian]:
+        """Return the uncertain constants of a flight by their column."""
+        return {name: g for name, g in self.every_constant.items() if g.sigma > 0.0}
+
+    @property
+    def every_constant(self) -> dict[str, Gaussian]:
+        """Return the constants of a flight by their column."""
+        return {'wind_x': self.wind_x, 'wind_y': self.wind_y, **self.offsets}
+
+    def state_residuals(self, states: FloatArray) -> FloatArray:
+        """Return by how many standard deviations releases differ from the prior.
+
+        Args:
+            states: In the paper's axes, shape (n, 14).
+
+        Returns:
+            Shape (n, 7).
+        """
+        pairs = zip(manner(states).T, self._of_state, strict=True)
+        return np.stack([(x - g.mean) / g.sigma for x, g in pairs], axis=1)
+
+    @property
+    def _of_state(self) -> tuple[Gaussian, ...]:
+        return (self.speed, self.climb, self.nose, self.bank, self.rate, self.rate, self.spin)
+
+
+def manner(states: FloatArray) -> FloatArray:
+    """Return speed, climb, nose, bank, p, q and spin of states, shape (n, 7), from (n, 14)."""
+    velocity = states[:, 3:6]
+    speed = np.maximum(np.sqrt(np.sum(velocity**2, axis=1)), 1e-6)
+    forward = velocity / speed[:, None]
+    level = np.maximum(np.hypot(forward[:, 0], forward[:, 1]), _HORIZONTAL)
+    right = np.stack([-forward[:, 1], forward[:, 0], np.zeros(len(states))], axis=1)
+    right /= level[:, None]
+    down = disc_axis(states)
+    nose = np.arcsin(np.clip(np.sum(down * forward, axis=1), -1.0, 1.0))
+    bank = -np.arcsin(np.clip(np.sum(down * right, axis=1), -1.0, 1.0))
+    climb = np.arctan2(-forward[:, 2], level)
+    return np.column_stack([speed, climb, nose, bank, states[:, 10:13]])
+
+
+def disc_offsets(disc: Disc, factor: float = 1.0) -> dict[str, Gaussian]:
+    """Return how uncertain the coefficients of a disc are: as its file states, else as usual.
+
+    Args:
+        disc: The disc.
+        factor: Of the standard deviations; 0: the disc is known exactly.
+    """
+    sigmas = {**DISC_OFFSETS, **disc.uncertainty, 'control_CL': ROLLING_OFFSET}
+    return {name: Gaussian(0.0, factor * sigma) for name, sigma in sigmas.items()}

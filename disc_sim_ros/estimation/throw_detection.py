@@ -1,0 +1,72 @@
+"""Where a throw begins and ends in a stream of positions."""
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.throw_estimator import straight
+
+WINDOW = 0.1  # s, in which a beginning is recognised
+LEAST = 6  # measurements of a beginning ...
+SHORTEST = 0.05  # ... and their time [s]
+LEAST_SPEED = 4.0  # m/s
+LEAST_HEIGHT = 0.2  # m, of the first measurement; a bounce is lower
+_MOST_OFF = 14.0  # squared residual up to which a point lies on the line
+_SHARE = 0.7  # of the points that must lie on it
+_AERODYNAMIC = 15.0  # m/s^2, usual acceleration of a flight
+_MOST_ACCELERATION = 30.0  # m/s^2, of a flight; a hand has 100
+AFTER_LANDING = 0.15  # s after the predicted landing until the throw has ended
+ENDED_BY = 6  # measurements one after the other that the flight cannot explain
+_FAR = 25.0  # their squared residual
+_ONE_STOP = 0.3  # share of the distances that outliers keep from each other: they are one object
+
+
+def beginning(time: FloatArray, position: FloatArray, sigma: FloatArray) -> int | None:
+    """Return the first of the newest points that are those of a flight; None if there are none.
+
+    Args:
+        time: Times [s], ascending, shape (k,).
+        position: Paper's axes [m], shape (k, 3).
+        sigma: Standard deviation of each coordinate [m], shape (k,).
+    """
+    for i in range(len(time) - LEAST + 1):
+        if time[-1] - time[i] < SHORTEST:
+            return None
+        if _is_flight(time[i:] - time[i], position[i:], sigma[i:]):
+            return i
+    return None
+
+
+def _is_flight(t: FloatArray, position: FloatArray, sigma: FloatArray) -> bool:
+    """Return True if points lie on a line at constant velocity, but for gravity and air."""
+    velocity, start = straight(t, position)
+    if float(np.linalg.norm(velocity)) < LEAST_SPEED or -start[2] < LEAST_HEIGHT:
+        return False
+    bend = _AERODYNAMIC * t[-1] ** 2 / 16.0  # of a parabola from its chord, half of it
+    off = position - start - t[:, None] * velocity
+    squared = np.sum(off**2, axis=1) / (sigma**2 + bend**2)
+    fits = squared < _MOST_OFF
+    if not fits[0] or float(np.mean(fits)) < _SHARE:
+        return False
+    acceleration = 2.0 * np.polynomial.polynomial.polyfit(t[fits], position[fits], 2)[2]
+    noise = float(np.median(sigma)) * np.sqrt(720.0 / fits.sum()) / t[-1] ** 2
+    return bool(np.linalg.norm(acceleration) < _MOST_ACCELERATION + 2.0 * noise)
+
+
+def has_ended(now: float, landing_time: float, measured: FloatArray, position: FloatArray) -> bool:
+    """Return True if a throw is over: it landed, or the newest measurements cannot be of it.
+
+    Args:
+        now: Time of the newest measurement since the reference [s].
+        landing_time: Predicted [s]; nan without a landing.
+        measured: Residuals of all measurements, shape (k, 6).
+        position: The measurements, shape (k, 3).
+    """
+    if now > landing_time + AFTER_LANDING:
+        return True
+    if len(measured) < ENDED_BY + LEAST:
+        return False
+    last = np.sum(measured[-ENDED_BY:, :3] ** 2, axis=1)
+    if not (last > _FAR).all():
+        return False
+    steps = np.linalg.norm(np.diff(position[-ENDED_BY:], axis=0), axis=1)
+    return float(np.median(steps)) < _ONE_STOP

@@ -1,0 +1,143 @@
+"""One throw, estimated from all its measurements: one Gauss-Newton step for each new one.
+
+A batch estimator, because a filter of this problem is overconfident (docs/predictor.md).
+"""
+
+import math
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.ellipse import linear_covariance, profiled_covariance
+from disc_sim_ros.estimation.throw_fit import (
+    POSITION,
+    Estimate,
+    Fitted,
+    Linear,
+    Measurements,
+    Model,
+    best_on_line,
+    linearised,
+    square_root,
+)
+
+FIRST_STEPS = 6  # Gauss-Newton steps of the first update
+_FIRST_VELOCITY = 1.0  # m/s, with which the first derivatives are taken
+_FIRST_LIFT = 5.0  # m/s^2
+_LOST = 4.0  # scale of the residuals from which the throw is fitted from the beginning
+_SHORTEST_GAP = 0.3  # share of the longest time between two measurements of a velocity
+
+
+class ThrowEstimator:
+    """The estimate of one throw.
+
+    Attributes:
+        fitted: The estimate and its residuals; None before the first update.
+        linear: The linear fit close to it.
+    """
+
+    def __init__(self, model: Model) -> None:
+        """Begin without an estimate."""
+        self._model = model
+        self.fitted: Fitted | None = None
+        self.linear: Linear | None = None
+        self._scale = np.ones(6)
+        self._spread = _first_spread(model)
+        self._data: Measurements | None = None
+
+    def update(self, data: Measurements, steps: int = 1) -> Fitted:
+        """Fit all measurements of the throw.
+
+        Args:
+            data: All measurements so far, the first at time 0.
+            steps: Gauss-Newton steps; the first update makes more.
+        """
+        if self.fitted is None or self._scale[0] > _LOST or not math.isfinite(self.fitted.cost):
+            estimate, self._spread = first_estimate(self._model, data), _first_spread(self._model)
+            steps = FIRST_STEPS
+        else:
+            estimate = self.fitted.estimate
+        for _ in range(steps):
+            self.linear, step, self._scale = linearised(self._model, estimate, self._spread, data)
+            self.fitted = best_on_line(self._model, estimate, step, data, self._scale)
+            estimate = self.fitted.estimate
+            self._spread = square_root(self.linear.covariance[POSITION:, POSITION:])
+        self._data = data
+        assert self.fitted is not None  # noqa: S101 - for the type checker
+        return self.fitted
+
+    def landing_covariance(self, *, profiled: bool = True) -> FloatArray:
+        """Return the covariance of X, Y [m] and time [s] of the landing, shape (3, 3).
+
+        Args:
+            profiled: By a profile of the fit, which takes a few times an update; else linear.
+        """
+        if self.fitted is None or self.linear is None or self._data is None:
+            return np.full((3, 3), np.nan)
+        if not profiled:
+            return linear_covariance(self.linear)
+        return profiled_covariance(
+            self._model,
+            self.fitted.estimate,
+            self.fitted.landing,
+            self.linear,
+            self._data,
+            self._scale,
+        )
+
+
+def _first_spread(model: Model) -> FloatArray:
+    """Return the standard deviations with which the first derivatives are taken."""
+    prior, v = model.prior, _FIRST_VELOCITY
+    rates = (prior.rate.sigma, prior.rate.sigma, prior.spin.sigma)
+    every = np.array([0.0, 0.0, 0.0, v, v, v, _FIRST_LIFT, prior.bank.sigma, *rates])
+    return np.diag([*every[model.coordinates][POSITION:], *model.sigmas])
+
+
+def first_estimate(model: Model, data: Measurements) -> Estimate:
+    """Return a throw through the first measurements.
+
+    Its attitude is the median of those measured, else that of the prior.
+    """
+    velocity, position = straight(data.time, data.position)
+    forward = velocity / max(float(np.linalg.norm(velocity)), 1e-3)
+    measured = data.axis[np.isfinite(data.axis).all(axis=1)]
+    if len(measured):
+        down = np.median(measured, axis=0)
+    else:
+        level = np.array([-forward[1], forward[0], 0.0])
+        right = level / max(float(np.linalg.norm(level)), 1e-6)
+        nose, bank = model.prior.nose.mean, model.prior.bank.mean
+        down = np.cross(forward, right) * math.cos(nose) * math.cos(bank)
+        down = down + forward * math.sin(nose) - right * math.sin(bank)
+    rate = model.prior.rate.mean
+    state = [*position, *velocity, *attitude(down), rate, rate, model.prior.spin.mean, 0.0]
+    return Estimate(np.array(state), model.means.copy())
+
+
+def attitude(down: FloatArray) -> FloatArray:
+    """Return the smallest turn that takes z to the direction `down`, a quaternion, shape (4,)."""
+    X, Y, Z = down / max(float(np.linalg.norm(down)), 1e-12)
+    if Z < -1.0 + 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    e = np.array([1.0 + Z, -Y, X, 0.0])
+    unit: FloatArray = e / np.linalg.norm(e)
+    return unit
+
+
+def straight(time: FloatArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return velocity and position at time 0 of the line through points.
+
+    They are medians, so that a minority of outliers has little effect.
+
+    Args:
+        time: Times, not all equal [s], shape (k,).
+        position: Points [m], shape (k, 3).
+    """
+    few = slice(None, None, max(1, len(time) // 24))
+    t, x = time[few], position[few]
+    i, j = np.triu_indices(len(t), 1)
+    gap = t[j] - t[i]
+    keep = gap >= _SHORTEST_GAP * gap.max()
+    velocity = np.median((x[j] - x[i])[keep] / gap[keep, None], axis=0)
+    return velocity, np.median(x - t[:, None] * velocity, axis=0)

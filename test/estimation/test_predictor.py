@@ -1,0 +1,220 @@
+import math
+
+import numpy as np
+import pytest
+
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
+from disc_sim_ros.estimation.prior import ThrowPrior, disc_offsets
+from disc_sim_ros.physics.disc_file import load_disc
+from disc_sim_ros.physics.flight import Setup
+from estimation.synthetic_throws import Throw, throw
+
+SETUP = Setup(disc=load_disc('ultrastar'))
+PRIOR = ThrowPrior()
+CONFIG = PredictorConfig(setup=SETUP)
+INSIDE = 4.605  # of 90 % of two normal numbers
+
+
+def follow(
+    measurements: list[Measurement], until: float, config: PredictorConfig = CONFIG
+) -> Prediction:
+    """Return the prediction after the measurements up to `until`, an update for every fourth."""
+    predictor, prediction = Predictor(config), None
+    for k, m in enumerate(m for m in measurements if m.time <= until):
+        predictor.add(m)
+        if k < 12 or k % 4 == 0:  # a computer that is late
+            prediction = predictor.update(profiled=False) or prediction
+    prediction = predictor.update(profiled=False) or prediction
+    assert prediction is not None
+    return prediction
+
+
+def miss(prediction: Prediction, flown: Throw) -> float:
+    return float(np.linalg.norm(prediction.landing - flown.landing[:2]))
+
+
+@pytest.fixture(scope='module')
+def throws() -> list[Throw]:
+    return [throw(SETUP, PRIOR, seed) for seed in range(10)]
+
+
+def test_landing_is_known_after_a_second(throws):
+    """The bound of these throws is 0.2 m with attitude (benchmarks/predictor.py).
+
+    The median of ten throws lies within a factor of 2 of that of many.
+    """
+    misses = [miss(follow(t.measurements(axis=True), 1.0), t) for t in throws]
+    assert np.median(misses) < 0.5
+
+
+def test_positions_alone_need_longer(throws):
+    misses = {
+        until: np.median([miss(follow(t.measurements(), until), t) for t in throws])
+        for until in (0.5, 1.5)
+    }
+    assert misses[1.5] < 0.7  # bound 0.3 m; a parabola misses by several metres
+    assert misses[1.5] < misses[0.5]
+
+
+def test_last_prediction_is_within_centimetres(throws):
+    """At the end of a flight only the noise of the positions is left: 2 cm."""
+    for t in throws[:4]:
+        prediction = follow(t.measurements(), math.inf)
+        assert miss(prediction, t) < 0.06
+        assert prediction.landing_time == pytest.approx(t.landing[2], abs=0.02)
+
+
+def test_ellipse_is_of_the_size_of_the_miss(throws):
+    """Nine of ten landings lie in a right ellipse; of ten, fewer than six are 1 in 600."""
+    inside = 0
+    for t in throws:
+        predictor = Predictor(CONFIG)
+        prediction = None
+        for m in t.measurements(axis=True):
+            if m.time > 1.0:
+                break
+            predictor.add(m)
+            prediction = predictor.update(profiled=m.time > 0.98) or prediction
+        off = prediction.landing - t.landing[:2]
+        inside += off @ np.linalg.solve(prediction.covariance[:2, :2], off) < INSIDE
+        assert np.sqrt(np.trace(prediction.covariance[:2, :2])) < 5.0
+    assert inside >= 6
+
+
+def test_same_measurements_give_the_same_bits(throws):
+    first, second = (follow(throws[0].measurements(), 1.0) for _ in range(2))
+    assert first.landing.tobytes() == second.landing.tobytes()
+    assert first.covariance.tobytes() == second.covariance.tobytes()
+
+
+def test_outliers_of_metres_cost_little(throws):
+    clean, spoiled = [], []
+    for seed, t in enumerate(throws):
+        rng = np.random.default_rng(seed)
+        position = t.position.copy()
+        bad = rng.random(len(position)) < 0.1
+        position[bad] += rng.normal(0.0, 5.0, (bad.sum(), 3))
+        dirty = Throw(t.landing, t.time, position, t.axis)
+        clean.append(miss(follow(t.measurements(), 1.5), t))
+        spoiled.append(miss(follow(dirty.measurements(), 1.5), t))
+    assert np.median(spoiled) < 2.0 * np.median(clean)  # the scatter of medians of ten
+
+
+def test_throw_begins_after_the_hand_and_ends_on_the_ground(throws):
+    """A hand accelerates at 100 m/s^2; then the disc flies, and lies where it landed."""
+    t = throws[1]
+    velocity = (t.position[6] - t.position[0]) / (t.time[6] - t.time[0])
+    predictor = Predictor(CONFIG)
+    speed = float(np.linalg.norm(velocity))
+    for k in range(-30, 0):
+        tau = k / 60.0
+        before = max(tau, -speed / 100.0)
+        at = t.position[0] + velocity * before + 0.5 * 100.0 * velocity / speed * before**2
+        predictor.add(Measurement(tau, tuple(at)))
+        assert predictor.update(profiled=False) is None
+    first = None
+    for m in t.measurements():
+        predictor.add(m)
+        if predictor.update(profiled=False) is not None and first is None:
+            first = m.time
+    assert first is not None
+    assert first < 0.15  # a window of 0.1 s and two more measurements
+    x, y, end = t.landing
+    for k in range(1, 30):
+        predictor.add(Measurement(end + k / 60.0, (x, y, 0.0)))
+        predictor.update(profiled=False)
+        if not predictor.is_following:
+            break
+    assert k / 60.0 < 0.2
+    assert predictor.throws == 1
+
+
+def test_catch_ends_a_throw(throws):
+    t = throws[0]
+    predictor = Predictor(CONFIG)
+    for m in t.measurements():
+        if m.time > 1.0:
+            break
+        predictor.add(m)
+        predictor.update(profiled=False)
+    assert predictor.is_following
+    for k in range(1, 20):
+        predictor.add(Measurement(1.0 + k / 60.0, tuple(t.position[60])))
+        predictor.update(profiled=False)
+        if not predictor.is_following:
+            break
+    assert not predictor.is_following
+
+
+def test_order_of_measurements_does_not_matter(throws):
+    measurements = throws[2].measurements()[:60]
+    shuffled = [*measurements[:10], *measurements[20:60], *measurements[10:20]]
+    predictions = []
+    for order in (measurements, shuffled):
+        predictor = Predictor(CONFIG)
+        for m in order[:10]:
+            predictor.add(m)
+        predictor.update(profiled=False)
+        for m in order[10:]:
+            predictor.add(m)
+        predictions.append(predictor.update(profiled=False))
+    assert predictions[0].landing.tobytes() == predictions[1].landing.tobytes()
+
+
+def test_measurement_before_the_throw_and_repeated_ones_are_counted(throws):
+    predictor = Predictor(CONFIG)
+    measurements = throws[0].measurements()
+    for m in measurements[5:20]:
+        predictor.add(m)
+    predictor.update(profiled=False)
+    assert predictor.is_following
+    assert not predictor.add(measurements[0])
+    assert not predictor.add(measurements[10])
+    assert predictor.late == 2
+
+
+def test_wind_is_estimated(throws):
+    """With attitude, the wind is known to a fraction of its prior of 2 m/s after 1.5 s."""
+    sigmas = [
+        np.sqrt(np.diag(follow(t.measurements(axis=True), 1.5).wind_covariance)) for t in throws
+    ]
+    assert np.median(sigmas) < 1.0
+
+
+def test_uncertain_disc_widens_the_ellipse(throws):
+    config = PredictorConfig(
+        setup=SETUP, prior=ThrowPrior(offsets=disc_offsets(load_disc('ultrastar')))
+    )
+    for t in throws[:3]:
+        known = follow(t.measurements(axis=True), 1.0).covariance
+        unknown = follow(t.measurements(axis=True), 1.0, config).covariance
+        assert np.trace(unknown[:2, :2]) > np.trace(known[:2, :2])
+
+
+def test_memory_of_a_throw_is_bounded(throws):
+    from disc_sim_ros.estimation.predictor import MOST_MEASUREMENTS
+
+    t = throw(SETUP, PRIOR, 5, rate=1000.0, least=2.5)
+    predictor, prediction = Predictor(CONFIG), None
+    for k, m in enumerate(t.measurements()):
+        predictor.add(m)
+        assert len(predictor._rows) <= MOST_MEASUREMENTS
+        if k % 100 == 99:
+            prediction = predictor.update(profiled=False) or prediction
+    assert miss(prediction, t) < 0.5
+
+
+@pytest.mark.parametrize(
+    ('field', 'value'),
+    [
+        ('time', math.nan),
+        ('position', (0.0, math.inf, 1.0)),
+        ('axis', (0.0, 0.0, 0.0)),
+        ('position_sigma', 0.0),
+    ],
+)
+def test_bad_measurement_is_refused(field, value):
+    good = {'time': 0.0, 'position': (0.0, 0.0, 1.0)}
+    with pytest.raises(ConfigError, match=f'measured {field}'):
+        Measurement(**{**good, field: value})
