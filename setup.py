@@ -94,7 +94,15 @@ setup(
         'Typing :: Typed',
     ],
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', 'physics/discs/*.yaml', 'paper/data/*', 'view/assets/*']},
+    package_data={
+        NAME: [
+            'py.typed',
+            'physics/discs/*.yaml',
+            'paper/data/*',
+            'view/assets/*',
+            'envs/policies/*',
+        ]
+    },
     data_files=data_files(),
     distclass=DataDistribution,
     zip_safe=False,
@@ -126,6 +134,10 @@ setup(
         'view': ['trimesh>=5,<6', 'websockets>=13,<18'],
         # `sweep --executor dask`.
         'dask': ['dask>=2024.5', 'distributed>=2024.5'],
+        # Environments for reinforcement learning, docs/learning.md.
+        'envs': ['gymnasium>=1.1,<2'],
+        # examples/train_steer.py; PyTorch takes 0.2 to 3 GB.
+        'learn': ['gymnasium>=1.1,<2', 'stable-baselines3>=2.4,<3', 'torch>=2.3,<3'],
         # `make docs`.
         'docs': ['furo>=2024.8', 'myst-parser>=4,<6', 'Sphinx>=8,<10'],
         'fuzz': ['atheris>=2.3,<4'],
@@ -136,6 +148,7 @@ setup(
             'pytest>=8,<9.2',
             'pytest-timeout>=2.3,<3',
             'pytest-xdist>=3.5,<4',
+            'gymnasium>=1.1,<2',
             'hypothesis>=6.100,<7',
             'rosbags>=0.10.4,<1',
             'ruff>=0.14,<1',

@@ -32,6 +32,7 @@ EXTRAS = (
     'parquet',
     'view',
     'dask',
+    'envs',
     'test',
     'docs',
 )  # of the development environment
@@ -42,6 +43,7 @@ DISTRIBUTED = (
     'parquet',
     'view',
     'dask',
+    'envs',
 )  # what users run; the other extras are tools
 RENEW = 'run `make lock`, then `make test`'
 WHY = {
@@ -51,6 +53,7 @@ WHY = {
     'dask': 'ensembles on many machines, `sweep --executor dask`',
     'distributed': 'as dask',
     'hypothesis': 'property-based tests',
+    'gymnasium': 'the interface of environments for reinforcement learning',
     'furo': 'theme of the documentation site; its files are local',
     'llvmlite': 'SIMD instructions for numba, which depends on it',
     'myst-parser': 'Markdown pages for Sphinx',
@@ -75,6 +78,8 @@ WHY = {
     'ruff': 'linter and formatter',
     'scipy': 'fits, optimisation and integration in analyses',
     'Sphinx': 'builds the documentation site',
+    'stable-baselines3': 'trains the policy of `examples/train_steer.py`',
+    'torch': 'as stable-baselines3; flying the policy does not need it',
     'trimesh': 'the viewer of pages with flights, with three.js in it',
     'types-PyYAML': 'types of PyYAML for mypy',
     'websockets': 'the web server of `live_view`',
@@ -89,6 +94,8 @@ TOOLS_ONLY = {'MPL-2.0', 'any OSI', 'Public Domain and BSD and GPL'}
 # Packages whose metadata name no licence, or that are not installed: from their repositories.
 _FROM_REPOSITORY = {
     'atheris': 'Apache-2.0',
+    'stable-baselines3': 'MIT',
+    'torch': 'BSD-3-Clause',
     'ros-fastcdr': 'Apache-2.0',
     'ros-fastrtps': 'Apache-2.0',
 }

@@ -11,14 +11,18 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup
 from disc_sim_ros.physics.kernels import step_batch
-from disc_sim_ros.physics.kernels.integrator import LANDED, LOST
+from disc_sim_ros.physics.kernels.integrator import LANDED, LOST, STATE_SIZE
 from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
 from disc_sim_ros.physics.kernels.rk4 import Inputs
 from disc_sim_ros.physics.kernels.simd import WIDTH
+from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import CONTROL, LAUNCH, MEAN_WIND
+from disc_sim_ros.validation import Quantity
 
 _LEAST = 64  # blocks for which a second thread pays
 _CONTROL_NAMES = tuple(CONTROL)
+_NO_STATES = np.empty((0, 0))
+_NO_LAUNCHES = np.empty((0, len(LAUNCH)))
 
 
 class BatchSimulator:
@@ -81,32 +85,53 @@ class BatchSimulator:
         Raises:
             ConfigError: A value is out of range, or the step too long for a flight.
         """
-        flights = np.asarray(flights, dtype=np.int64)
         launches = np.ascontiguousarray(launches, dtype=float)
-        winds = np.ascontiguousarray(winds, dtype=float)
-        if flights.size and (flights.min() < 0 or flights.max() >= self.count):
-            raise ConfigError('flights', flights.tolist(), f'give numbers below {self.count}')
-        for columns, quantities in ((launches, LAUNCH), (winds, MEAN_WIND)):
-            if columns.shape != (len(flights), len(quantities)):
-                allowed = f'give shape ({len(flights)}, {len(quantities)})'
-                raise ConfigError('shape', columns.shape, allowed)
-            for j, quantity in enumerate(quantities.values()):
-                x = columns[:, j]
-                good = (x >= quantity.lowest) & (x <= quantity.highest)
-                if not good.all():
-                    quantity.check(float(x[np.argmin(good)]))
-        if not flights.size:
+        numbers, winds = self._checked(flights, winds)
+        _check_columns(launches, LAUNCH, len(numbers))
+        if not numbers.size:
             return
         if self.ground and launches[:, -1].min() < 0.0:
-            low = float(launches[:, -1].min())
-            raise ConfigError('height', low, 'with ground, release at 0 m or above', 'height')
+            raise ConfigError('height', float(launches[:, -1].min()), ABOVE_GROUND, 'height')
         speeds = launches[:, 0] + np.linalg.norm(winds, axis=1)
         spin = float(np.abs(launches[:, list(LAUNCH).index('spin')]).max())
         self.setup.check_step(spin, float(speeds.max()))
+        self._release(numbers, launches, _NO_STATES, winds)
+
+    def place(self, flights: ArrayLike, states: FloatArray, winds: ArrayLike) -> None:
+        """Let some discs fly from any states, with control inputs 0.
+
+        Args:
+            flights: Numbers of the flights, shape (m,).
+            states: Columns as in State, of sound flights, shape (14, m).
+            winds: Mean winds in `map` [m/s], shape (m, 3).
+
+        Raises:
+            ConfigError: A number is not finite, or a wind out of range.
+        """
+        numbers, winds = self._checked(flights, winds)
+        if states.shape != (STATE_SIZE, len(numbers)):
+            allowed = f'give shape ({STATE_SIZE}, {len(numbers)})'
+            raise ConfigError('states', states.shape, allowed)
+        if not np.isfinite(states).all():
+            raise ConfigError('states', 'nan or inf', 'give finite numbers')
+        self._release(numbers, _NO_LAUNCHES, np.ascontiguousarray(states), winds)
+
+    def _checked(self, flights: ArrayLike, winds: ArrayLike) -> tuple[IntArray, FloatArray]:
+        numbers = np.asarray(flights, dtype=np.int64)
+        if numbers.size and (numbers.min() < 0 or numbers.max() >= self.count):
+            raise ConfigError('flights', numbers.tolist(), f'give numbers below {self.count}')
+        columns = np.ascontiguousarray(winds, dtype=float)
+        _check_columns(columns, MEAN_WIND, len(numbers))
+        return numbers, columns
+
+    def _release(
+        self, flights: IntArray, launches: FloatArray, states: FloatArray, winds: FloatArray
+    ) -> None:
         step_batch.release_batch(
             self._batch,
             flights,
             launches,
+            states,
             frames.paper_from_map(winds),
             self.setup.plant,
             self._inputs,
@@ -138,13 +163,7 @@ class BatchSimulator:
         Raises:
             ConfigError: A component is out of range.
         """
-        if winds.shape != (self.count, 3):
-            raise ConfigError('wind', winds.shape, f'give shape ({self.count}, 3)')
-        for j, quantity in enumerate(MEAN_WIND.values()):
-            x = winds[:, j]
-            good = (x >= quantity.lowest) & (x <= quantity.highest)
-            if not good.all():
-                quantity.check(float(x[np.argmin(good)]))
+        _check_columns(winds, MEAN_WIND, self.count)
         to_lanes(frames.paper_from_map(winds), self._batch.wind)
 
     def advance(self, steps: int) -> None:
@@ -184,6 +203,20 @@ class BatchSimulator:
         """
         return from_lanes(self._batch.state, self.count)
 
+    def present(self, flights: ArrayLike) -> FloatArray:
+        """Return the present states of some flights: of those that landed, at the landing.
+
+        Args:
+            flights: Their numbers, shape (m,).
+
+        Returns:
+            Columns as in State, shape (14, m).
+        """
+        b, lane = np.divmod(np.asarray(flights, dtype=np.int64), WIDTH)
+        landed = self._batch.status[b, lane] == LANDED
+        states = self._batch.end[b, :, lane], self._batch.state[b, :, lane]
+        return np.where(landed[:, np.newaxis], *states).T
+
     @property
     def end_columns(self) -> FloatArray:
         """Return the states at the end, a copy, shape (14, count); of ended flights only."""
@@ -217,6 +250,17 @@ class BatchSimulator:
     @property
     def _status(self) -> IntArray:
         return self._batch.status.reshape(-1)[: self.count]
+
+
+def _check_columns(columns: FloatArray, quantities: dict[str, Quantity], count: int) -> None:
+    """Refuse numbers that are out of range, or columns of another shape."""
+    if columns.shape != (count, len(quantities)):
+        allowed = f'give shape ({count}, {len(quantities)})'
+        raise ConfigError('shape', columns.shape, allowed)
+    for x, quantity in zip(columns.T, quantities.values(), strict=True):
+        good = (x >= quantity.lowest) & (x <= quantity.highest)
+        if not good.all():
+            quantity.check(float(x[np.argmin(good)]))
 
 
 def to_lanes(rows: FloatArray, lanes: FloatArray) -> None:

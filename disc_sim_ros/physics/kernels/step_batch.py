@@ -70,6 +70,7 @@ def release_batch(
     batch: Batch,
     flights: IntArray,
     launches: FloatArray,
+    states: FloatArray,
     winds: FloatArray,
     plant: Plant,
     inputs: Inputs,
@@ -80,6 +81,7 @@ def release_batch(
         batch: Updated.
         flights: Their numbers, shape (m,).
         launches: A launch in each row, the first ten columns of `rows.NAMES`, shape (m, 10).
+        states: States at release instead, shape (14, m); shape (0, 0) for the launches.
         winds: Mean winds, earth axes 1 [m/s], shape (m, 3).
         plant: Constants of the flights.
         inputs: Moments in N m, and profile of the wind.
@@ -89,7 +91,7 @@ def release_batch(
         for i in range(3):
             batch.control[b, i, lane] = 0.0
             batch.wind[b, i, lane] = winds[k, i]
-        s = release(launches[k])
+        s = _state_of_lane(states, k) if len(states) > 0 else release(launches[k])
         for i in range(STATE_SIZE):
             batch.release[b, i, lane] = s[i]
         own = _inputs_of_lane(batch, b, lane, inputs)
@@ -248,7 +250,7 @@ def _inputs_of_lane(batch: Batch, b: int, lane: int, inputs: Inputs) -> Inputs:
 
 @inline
 def _state_of_lane(a: FloatArray, lane: int) -> State:
-    """Return the state in a lane as floats."""
+    """Return the state in a lane, or in a column of shape (14, m), as floats."""
     return State(
         a[0, lane],
         a[1, lane],
