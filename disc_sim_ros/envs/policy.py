@@ -10,11 +10,13 @@ import zipfile
 import numpy as np
 
 from disc_sim_ros import files
+from disc_sim_ros.envs import steering
 from disc_sim_ros.envs.components import Float32Array
 from disc_sim_ros.errors import ConfigError
 
 Layer = tuple[Float32Array, Float32Array]  # weights, shape (inputs, outputs), and biases
 _MOST_LAYERS = 20
+TRAINED = Path(__file__).parent / 'policies' / 'steer.npz'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +61,11 @@ class Policy:
         buffer = io.BytesIO()
         np.savez(buffer, **arrays)
         files.write_whole(path, buffer.getvalue())
+
+
+def trained_policy() -> Policy:
+    """Return the policy for Steer-v0 that comes with the package."""
+    return load_policy(TRAINED, len(steering.OBSERVATION), len(steering.ACTION))
 
 
 def load_policy(path: Path, inputs: int, outputs: int) -> Policy:

@@ -24,7 +24,7 @@ OBSERVATION = (
     *vector('acceleration', 'm/s^2', 200.0, 'Mean acceleration since the last action'),
     *vector('up', '', 1.0, 'Unit vector out of the top of the disc'),
     *vector('turning', 'rad/s', 100.0, 'Angular velocity without the spin'),
-    Component('spin', 'rad/s', -200.0, 200.0, 'Spin rate, clockwise from above positive'),
+    Component('spin', 'rad/s', -150.0, 150.0, 'Spin rate, clockwise from above positive'),
 )
 ACTION = tuple(
     Component(name, '', -1.0, 1.0, f'{symbol} as a share of {most:g}, {sign} positive')

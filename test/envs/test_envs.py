@@ -61,11 +61,11 @@ def test_make_vec_gives_the_native_vector(name):
 def test_seeds_repeat_and_differ(kind, size):
     def run(seed):
         vector = kind(6)
-        seen = [vector.reset(seed=seed)[0]]
+        rows = [vector.reset(seed=seed)[0]]
         for action in actions(150, 6, size):
             observed, rewards, *_ = vector.step(action)
-            seen += [observed, rewards]
-        return np.concatenate([x.ravel() for x in seen])
+            rows += [observed, rewards]
+        return np.concatenate([x.ravel() for x in rows])
 
     first = run(3)
     assert np.array_equal(first, run(3))
@@ -124,15 +124,15 @@ def episodes(mode: AutoresetMode, n: int = 5) -> dict[int, list[float]]:
     vector = SteerVectorEnv(n, autoreset_mode=mode)
     vector.reset(seed=0, options=FIXED)
     plan, age = actions(200, n, 3), np.zeros(n, dtype=int)
-    found = {i: [] for i in range(n)}
+    misses = {i: [] for i in range(n)}
     waiting = np.zeros(n, dtype=bool)
-    while min(map(len, found.values())) < 2:
+    while min(map(len, misses.values())) < 2:
         act = plan[age, np.arange(n)]
         _, rewards, terminated, _, infos = vector.step(act)
         info = infos.get('final_info', infos)
         age += 1
         for i in np.flatnonzero(terminated):
-            found[i].append(info['miss'][i])
+            misses[i].append(info['miss'][i])
             assert rewards[i] == -info['miss'][i]
         assert (rewards[~terminated] == 0.0).all()
         if mode is AutoresetMode.NEXT_STEP:
@@ -142,7 +142,7 @@ def episodes(mode: AutoresetMode, n: int = 5) -> dict[int, list[float]]:
             age[terminated] = 0
         if mode is AutoresetMode.DISABLED and terminated.any():
             vector.reset(options=FIXED | {'reset_mask': terminated})
-    return {i: misses[:2] for i, misses in found.items()}
+    return {i: misses[:2] for i, misses in misses.items()}
 
 
 def test_every_way_of_reset_gives_the_same_episodes():

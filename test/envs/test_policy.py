@@ -21,22 +21,22 @@ def policy(inputs: int = 4, outputs: int = 2, hidden: int = 3) -> Policy:
 
 def test_actions_are_those_of_the_network_written_out():
     p = policy()
-    seen = np.array([[1.0, -2.0, 30.0, 0.5]], 'f4')
-    x = [min(max((a - m) * 0.5, -5.0), 5.0) for a, m in zip(seen[0], p.mean, strict=True)]
+    rows = np.array([[1.0, -2.0, 30.0, 0.5]], 'f4')
+    x = [min(max((a - m) * 0.5, -5.0), 5.0) for a, m in zip(rows[0], p.mean, strict=True)]
     (W, b), (V, c) = ((w.astype(float), bias.astype(float)) for w, bias in p.layers)
     hidden = [max(sum(x[i] * W[i, j] for i in range(4)) + b[j], 0.0) for j in range(3)]
     out = [sum(hidden[j] * V[j, k] for j in range(3)) + c[k] for k in range(2)]
     expected = np.clip(out, -1.0, 1.0)
     assert any(h > 0.0 for h in hidden)
-    assert np.allclose(p(seen)[0], expected, atol=1e-5)  # float32 has 7 digits
+    assert np.allclose(p(rows)[0], expected, atol=1e-5)  # float32 has 7 digits
 
 
 def test_a_saved_policy_is_read_again(tmp_path):
     p = policy()
     p.save(tmp_path / 'p.npz')
     again = load_policy(tmp_path / 'p.npz', 4, 2)
-    seen = np.random.default_rng(1).normal(size=(7, 4)).astype('f4')
-    assert np.array_equal(again(seen), p(seen))
+    rows = np.random.default_rng(1).normal(size=(7, 4)).astype('f4')
+    assert np.array_equal(again(rows), p(rows))
 
 
 @pytest.mark.parametrize(
