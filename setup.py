@@ -18,6 +18,8 @@ EXECUTABLES = {
     'live_view': 'disc_sim_ros.cli.live_view:main',
     'optimise': 'disc_sim_ros.cli.optimise:main',
     'paper_figures': 'disc_sim_ros.cli.paper_figures:main',
+    'predict': 'disc_sim_ros.cli.predict:main',
+    'predictor_node': 'disc_sim_ros.cli.predictor_node:main',
     'recorder_node': 'disc_sim_ros.cli.recorder_node:main',
     'repair_bag': 'disc_sim_ros.cli.repair_bag:main',
     'sim_node': 'disc_sim_ros.cli.sim_node:main',

@@ -342,6 +342,49 @@ RECORDING = _table(
     BAG_FILES['flush_period'].within(0.01, 60.0),
 )  # fmt: skip
 
+# What a predictor of landings expects of a throw and of its measurements.
+PREDICTION = _table(
+    Quantity(
+        'position_sigma', 'm', 1e-4, 10.0, 0.02,
+        'Standard deviation of each coordinate of a measured position',
+    ),
+    Quantity(
+        'attitude_sigma', 'degrees', 0.01, 90.0, 2.0,
+        "Standard deviation of the measured axis of the disc, each direction",
+    ),
+    Quantity('throw_speed', 'm/s', 1.0, 100.0, 17.0, 'Speed over the ground that is expected'),
+    Quantity('throw_speed_sigma', 'm/s', 0.1, 100.0, 4.0, 'Its standard deviation'),
+    Quantity(
+        'throw_spin', 'rad/s', -1300.0, 1300.0, 60.0, 'Spin that is expected',
+        'clockwise from above positive',
+    ),
+    Quantity('throw_spin_sigma', 'rad/s', 0.1, 1000.0, 15.0, 'Its standard deviation'),
+    Quantity(
+        'wind_sigma', 'm/s', 0.0, 50.0, 2.0,
+        'Standard deviation of the wind along x and y; 0: it is known',
+    ),
+    Quantity(
+        'disc_uncertainty', '', 0.0, 10.0, 1.0,
+        'Factor of the standard deviations of the coefficients of the disc; 0: they are known',
+    ),
+    Quantity('ground_height', 'm', -1000.0, 10000.0, 0.0, 'Height of the ground, z in `map`'),
+)  # fmt: skip
+PREDICTOR_NODE = _table(
+    Quantity(
+        'added_noise', 'm', 0.0, 10.0, 0.0,
+        'Standard deviation of noise that is added to each coordinate, for a simulator',
+    ),
+    Quantity('ellipse_rate', 'Hz', 0.5, 500.0, 20.0, 'Ellipses a second of measured time'),
+    Quantity(
+        'predicted_path_rate', 'Hz', 0.0, 500.0, 50.0,
+        'Points of `predicted_path` a second; 0: no path and no `intercept`',
+    ),
+    Quantity(
+        'intercept_height', 'm', -1000.0, 10000.0, 1.0,
+        'Height, z in `map`, at which `intercept` is on the way down',
+    ),
+)  # fmt: skip
+
 # The page of the running simulator.
 LIVE_VIEW = _table(
     Quantity('port', '', 0, 65_535, 8080, 'Port of the page; 0: a free one', whole=True),
@@ -372,6 +415,8 @@ QUANTITIES = {
     **RECORDING,
     **BAG_FILES,
     **LIVE_VIEW,
+    **PREDICTION,
+    **PREDICTOR_NODE,
     **STUDY,
     **THROWER,
     **FLIGHT_NUMBERS,

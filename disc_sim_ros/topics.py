@@ -76,6 +76,22 @@ class Loss(StrEnum):
     NOT_RECORDED = 'not recorded'
 
 
+class PredictorTopic:
+    """Topics of predictor_node."""
+
+    # Taken, with MEASUREMENT_QOS.
+    MEASURED_POINT = 'measured_point'
+    MEASURED_POSE = 'measured_pose'
+    MEASURED_POSE_WITH_COVARIANCE = 'measured_pose_with_covariance'
+    # Published, with STATE_QOS.
+    LANDING = 'predicted_landing'
+    PATH = 'predicted_path'
+    ESTIMATE = 'estimate'
+    ELLIPSE = 'landing_ellipse'
+    INTERCEPT = 'intercept'
+    WIND = 'estimated_wind'
+
+
 class NodeTopic:
     """Topics that rclpy gives every node."""
 

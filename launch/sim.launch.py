@@ -29,7 +29,11 @@ from disc_sim_ros.ros.sim.parameters import TABLE
 
 SHARE = Path(__file__).parents[1]  # launch/, config/, rviz/ and urdf/ are side by side there
 NOT_GIVEN = ''
-WITH_THIS = ('sim_and_recorder.launch.py', 'two_discs.launch.py')  # they check their arguments
+WITH_THIS = (
+    'sim_and_recorder.launch.py',
+    'sim_and_predictor.launch.py',
+    'two_discs.launch.py',
+)  # they check their arguments
 
 ARGUMENTS = {
     'namespace': ('', 'Namespace of all nodes, such as red.'),

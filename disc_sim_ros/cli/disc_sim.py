@@ -43,6 +43,18 @@ def _demo() -> Program:
     return demo.main
 
 
+def _predict() -> Program:
+    from disc_sim_ros.cli import predict  # noqa: PLC0415
+
+    return predict.main
+
+
+def _predictor_node() -> Program:
+    from disc_sim_ros.cli import predictor_node  # noqa: PLC0415
+
+    return predictor_node.main
+
+
 def _analyse_bag() -> Program:
     from disc_sim_ros.cli import analyse_bag  # noqa: PLC0415
 
@@ -87,6 +99,8 @@ PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
     'sim_node': (_sim_node, 'run the simulator node (ROS 2)'),
     'recorder_node': (_recorder_node, 'run the recorder node (ROS 2)'),
     'live_view': (_live_view, 'show the running simulators in a browser (ROS 2)'),
+    'predictor_node': (_predictor_node, 'predict where a disc lands while it flies (ROS 2)'),
+    'predict': (_predict, 'predict the landings of recorded throws'),
     'analyse_bag': (_analyse_bag, 'summarise, verify or plot the flights in a bag'),
     'repair_bag': (_repair_bag, 'copy what a damaged bag still holds into a complete one'),
     'paper_figures': (_paper_figures, 'compute the figures of Crowther & Potts (2007)'),

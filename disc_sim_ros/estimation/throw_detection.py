@@ -5,7 +5,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.throw_estimator import straight
 
-WINDOW = 0.1  # s, in which a beginning is recognised
+WINDOW = 0.2  # s, in which a beginning is recognised
 LEAST = 6  # measurements of a beginning ...
 SHORTEST = 0.05  # ... and their time [s]
 LEAST_SPEED = 4.0  # m/s

@@ -187,10 +187,12 @@ class Linear:
     Attributes:
         covariance: Of the unknowns, shape (m, m).
         landing: Derivatives of X, Y and time of the landing, shape (3, m).
+        now: Derivatives of position and velocity at the newest measurement, shape (6, m).
     """
 
     covariance: FloatArray
     landing: FloatArray
+    now: FloatArray
 
 
 def residuals(
@@ -295,12 +297,17 @@ def linearised(
     landing[:, POSITION:] = _half_difference(r.landing, free)
     landing[:, :POSITION] = _landing_by_position(r.flights.ends[0])
 
+    now = np.eye(6, m)
+    now[POSITION:, POSITION:] = 0.0
+    now[:, POSITION:] = _half_difference(r.flights.states[:, -1, :6], free)
+
     normal = slopes.T @ slopes + prior.T @ prior
     gradient = slopes.T @ (r.measured[0] * roots).ravel() + prior.T @ r.prior[0]
     inverted = inverse(normal)
     turn = np.eye(m)
     turn[POSITION:, POSITION:] = spread
-    linear = Linear(turn @ inverted @ turn.T, landing @ np.linalg.inv(turn))
+    back = np.linalg.inv(turn)
+    linear = Linear(turn @ inverted @ turn.T, landing @ back, now @ back)
     return linear, -turn @ (inverted @ gradient), scale
 
 

@@ -18,6 +18,8 @@ def _reliable(depth: int, durability: DurabilityPolicy = DurabilityPolicy.VOLATI
 STATE_QOS = _reliable(2000)  # a recorder that is late for 0.2 s of 10 kHz loses nothing
 LATCHED_QOS = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)  # a late subscriber gets the last one
 COMMAND_QOS = _reliable(100)
+# Measurements, of reliable and of best-effort publishers.
+MEASUREMENT_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 CLOCK_QOS = _reliable(1)  # only the newest time counts; best-effort subscribers get it as well
 CLOCK_PERIOD = 0.005  # s of wall time; a node that follows it spends 14 % of a core at 250 Hz
 

@@ -24,6 +24,9 @@ class Throw:
     time: np.ndarray
     position: np.ndarray  # in map, with noise
     axis: np.ndarray
+    state: np.ndarray  # at the release, paper's axes
+    row: np.ndarray  # constants of the flight
+    exact: np.ndarray  # positions without noise, in map
 
     def measurements(self, *, axis: bool = False) -> list[Measurement]:
         return [
@@ -54,7 +57,15 @@ def throw(
     axis = up_axis(flown.states[0]) + rng.normal(0.0, axis_sigma, (len(times), 3))
     x, y, _ = map_from_paper(flown.ends[0, :3])
     aloft = times < flown.time[0]
-    return Throw(np.array([x, y, flown.time[0]]), times[aloft], position[aloft], axis[aloft])
+    return Throw(
+        np.array([x, y, flown.time[0]]),
+        times[aloft],
+        position[aloft],
+        axis[aloft],
+        state,
+        row,
+        map_from_paper(flown.states[0, aloft, :3]),
+    )
 
 
 def _release(

@@ -21,7 +21,6 @@ from disc_sim_ros.ros.internals import PolledSubscription
 from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS
 from disc_sim_ros.view.shown import LEVEL, System
 
-PREDICTED_LANDING = 'predicted_landing'
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 RARELY = 6  # updates between two looks at topics that change little
 DIAMETER = 0.27  # m, of a disc whose configuration is not known
@@ -51,7 +50,7 @@ class LiveDisc:
         self._odometry = newest(Odometry, topics.ODOM)
         self._release = newest(Odometry, topics.RELEASE, LATCHED_QOS)
         self._configuration = newest(String, topics.CONFIGURATION, LATCHED_QOS)
-        self._landing = newest(PoseWithCovarianceStamped, PREDICTED_LANDING)
+        self._landing = newest(PoseWithCovarianceStamped, topics.PredictorTopic.LANDING)
         self._applied_wind = newest(Vector3Stamped, topics.APPLIED_WIND)
         self._name, self._diameter = '', DIAMETER
         self._wind = (0.0, 0.0, 0.0)  # in `map` [m/s]

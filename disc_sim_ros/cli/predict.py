@@ -1,0 +1,212 @@
+"""`predict`: where recorded throws would have been predicted to land, while they flew."""
+
+import argparse
+from collections.abc import Sequence
+import dataclasses
+import json
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING, Any
+
+from disc_sim_ros import __version__
+from disc_sim_ros.cli import output
+from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
+from disc_sim_ros.cli.main import run_program
+from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.physics import disc_file
+from disc_sim_ros.quantities import MEAN_WIND, PREDICTION
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from disc_sim_ros.estimation.predictor import Measurement, PredictorConfig
+    from disc_sim_ros.estimation.replay import FollowedThrow
+
+WATCHED = (0.3, 0.5, 1.0, 1.5, 2.0)  # s, rows of the summary
+_FLAGS = {name: f'--{name.replace("_", "-")}' for name in PREDICTION}
+
+
+def parser(prog: str = 'predict') -> Parser:
+    """Return the command line of `predict`."""
+    p = Parser(
+        prog=prog,
+        description='Predict the landings of recorded throws from their measured positions, as '
+        'predictor_node does while they fly, and show how far each prediction is from the '
+        'landing. The landing is that of the last prediction, when the disc was nearly down. '
+        'FILE: a bag with nav_msgs/Odometry or geometry_msgs/PoseStamped, or a CSV file with the '
+        'columns t_s, x_m, y_m, z_m (map: x forward, y left, z up) and, if attitudes were '
+        'measured, qx, qy, qz, qw.',
+        epilog='Exit code 0; 1 if no throw was found; 2 for bad input.',
+    )
+    p.set_defaults(prog=prog)
+    p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    p.add_argument('source', type=path, metavar='FILE', help='a bag or a CSV file')
+    p.add_argument('--topic', help='the topic of the bag (default: the only one that moves)')
+    p.add_argument(
+        '--disc',
+        type=path,
+        default='ultrastar',
+        metavar='NAME|FILE.yaml|NUMBERS',
+        help='the disc, as for fly',
+    )
+    for name, quantity in PREDICTION.items():
+        add_quantity(p, _FLAGS[name], quantity)
+    add_components(p, '--wind', tuple(MEAN_WIND.values()), ('X', 'Y', 'Z'), 'expected wind in map')
+    p.add_argument(
+        '--position-only', action='store_true', help='leave out attitudes that were measured'
+    )
+    p.add_argument('--json', action='store_true', help='print one JSON document')
+    output.add_plot(p)
+    return p
+
+
+def main(arguments: Sequence[str] | None = None, prog: str = 'predict') -> int:
+    """Run `predict` and return its exit code: 0, 1 if no throw was found, 2 for bad input."""
+    return run_program(parser(prog), _run, arguments)
+
+
+def _run(chosen: argparse.Namespace) -> int:
+    from disc_sim_ros.estimation.replay import replay  # noqa: PLC0415 - not for --help
+    from disc_sim_ros.physics import sampled  # noqa: PLC0415
+
+    plot = getattr(chosen, 'plot', None)
+    if plot is not None:
+        output.check_plot(plot)
+    config = _config(chosen)
+    measurements = _measurements(chosen)
+    note = sampled.first_call_note()
+    if note:
+        output.note(chosen.prog, note)
+    throws = replay(measurements, config)
+    if not throws:
+        raise DiscSimError(f'{chosen.source}: no throw in {len(measurements)} measurements')
+    if chosen.json:
+        document = {'throws': [_document(throw) for throw in throws]}
+        output.show(json.dumps(document, allow_nan=False))
+    else:
+        output.show('\n\n'.join(_summary(throw) for throw in throws))
+    if plot is not None:
+        output.write_plot(plot, _figure(throws))
+    return 0
+
+
+def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
+    from disc_sim_ros.estimation.predictor_options import predictor_config  # noqa: PLC0415
+    from disc_sim_ros.physics.environment import Wind  # noqa: PLC0415
+    from disc_sim_ros.physics.flight import Setup  # noqa: PLC0415
+    from disc_sim_ros.physics.frames import flip_yz  # noqa: PLC0415
+
+    setup = Setup(disc=disc_file.load_disc(chosen.disc), wind=Wind(mean=flip_yz(chosen.wind)))
+    return predictor_config(setup, {name: getattr(chosen, name) for name in PREDICTION})
+
+
+def _measurements(chosen: argparse.Namespace) -> 'list[Measurement]':
+    from disc_sim_ros.estimation import replay  # noqa: PLC0415
+
+    source = Path(chosen.source)
+    if source.suffix.lower() == '.csv':
+        if chosen.topic is not None:
+            raise ConfigError('--topic', chosen.topic, 'a CSV file has no topics')
+        read = replay.read_csv(source)
+    else:
+        read = _of_bag(source, chosen.topic)
+    if chosen.position_only:
+        return [dataclasses.replace(m, axis=None) for m in read]
+    return read
+
+
+def _of_bag(source: Path, topic: str | None) -> 'list[Measurement]':
+    from disc_sim_ros.analysis import recording  # noqa: PLC0415
+    from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
+    from disc_sim_ros.estimation import replay  # noqa: PLC0415
+    from disc_sim_ros.physics.flight_config import NANOSECONDS  # noqa: PLC0415
+
+    discs = recording.discs(open_bag(source), topic)
+    if len(discs) > 1:
+        names = ', '.join(disc.motion.topic for disc in discs)
+        raise ConfigError('--topic', None, f'choose one of {names}')
+    motion = discs[0].motion
+    time = (motion.stamps - motion.stamps[0]) / NANOSECONDS
+    quaternion = motion.quaternion if motion.has_attitude else None
+    return replay.measurements(time, motion.position, quaternion)
+
+
+def _rows(throw: 'FollowedThrow') -> list[dict[str, float]]:
+    rows = []
+    for watched in WATCHED:
+        p = throw.at(watched)
+        if p is None or throw.watched[-1] < watched:
+            continue
+        variances = p.covariance[:2, :2].diagonal()
+        rows.append(
+            {
+                'watched_s': watched,
+                'x_m': float(p.landing[0]),
+                'y_m': float(p.landing[1]),
+                'landing_s': p.landing_time - p.reference_time,
+                'sigma_x_m': float(variances[0]) ** 0.5,
+                'sigma_y_m': float(variances[1]) ** 0.5,
+                'miss_m': float(((p.landing - throw.landing[:2]) ** 2).sum()) ** 0.5,
+            }
+        )
+    return rows
+
+
+def _document(throw: 'FollowedThrow') -> dict[str, Any]:
+    x, y, time = throw.landing
+    last = throw.predictions[-1]
+    return {
+        'throw': throw.number,
+        'begins_s': last.reference_time,
+        'landing_m': [float(x), float(y)],
+        'time_of_flight_s': float(time) - last.reference_time,
+        'to_the_landing': throw.is_complete,
+        'wind_m_s': [float(w) for w in last.wind],
+        'predictions': _rows(throw),
+    }
+
+
+def _summary(throw: 'FollowedThrow') -> str:
+    x, y, time = throw.landing
+    last = throw.predictions[-1]
+    lines = [
+        f'throw {throw.number}: measured from {last.reference_time:.3f} s, lands at '
+        f'x {x:.2f} m, y {y:.2f} m after {time - last.reference_time:.2f} s'
+    ]
+    if not throw.is_complete:
+        left = last.landing_time - last.time
+        lines.append(f'  the measurements end {left:.2f} s before the landing')
+    lines.append('  watched s   x m      y m      sigma x, y m     miss m')
+    lines += [
+        f'  {r["watched_s"]:8.1f}  {r["x_m"]:7.2f}  {r["y_m"]:7.2f}  '
+        f'{r["sigma_x_m"]:7.2f} {r["sigma_y_m"]:7.2f}  {r["miss_m"]:9.2f}'
+        for r in _rows(throw)
+    ]
+    lines.append(f'  estimated wind {last.wind[0]:.1f}, {last.wind[1]:.1f} m/s')
+    return '\n'.join(lines)
+
+
+def _figure(throws: 'Sequence[FollowedThrow]') -> 'Figure':
+    """Return the miss of each throw over the time of watching."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    from disc_sim_ros.palette import COLOURS  # noqa: PLC0415
+
+    figure = Figure(figsize=(8, 5), layout='constrained')
+    FigureCanvasAgg(figure)
+    axis = figure.add_subplot()
+    for i, throw in enumerate(throws):
+        colour = COLOURS[i % len(COLOURS)]
+        axis.semilogy(throw.watched, throw.misses, color=colour, label=f'throw {throw.number}')
+        sigma = [float(p.covariance[:2, :2].trace()) ** 0.5 for p in throw.predictions]
+        axis.semilogy(throw.watched, sigma, color=colour, ls=':')
+    axis.set(xlabel='watched, s', ylabel='miss of the predicted landing, m')
+    axis.set_title('dotted: standard deviation that the predictor states', fontsize=10)
+    axis.grid(color='0.9')
+    axis.legend(loc='best')
+    return figure
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,33 @@
+"""The configuration of a predictor from quantities with the names of `quantities.PREDICTION`."""
+
+from collections.abc import Mapping
+import math
+
+from disc_sim_ros.estimation.predictor import PredictorConfig
+from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.frames import map_from_paper
+
+
+def predictor_config(setup: Setup, values: Mapping[str, float]) -> PredictorConfig:
+    """Return a configuration.
+
+    Args:
+        setup: Disc, air, ground contact, and the mean wind that is expected.
+        values: In the ranges of `quantities.PREDICTION`, all of them.
+    """
+    wind_x, wind_y, _ = map_from_paper(setup.wind.mean)
+    prior = ThrowPrior(
+        speed=Gaussian(values['throw_speed'], values['throw_speed_sigma']),
+        spin=Gaussian(values['throw_spin'], values['throw_spin_sigma']),
+        wind_x=Gaussian(float(wind_x), values['wind_sigma']),
+        wind_y=Gaussian(float(wind_y), values['wind_sigma']),
+        offsets=disc_offsets(setup.disc, values['disc_uncertainty']),
+    )
+    return PredictorConfig(
+        setup=setup,
+        prior=prior,
+        position_sigma=values['position_sigma'],
+        attitude_sigma=math.radians(values['attitude_sigma']),
+        ground_height=values['ground_height'],
+    )

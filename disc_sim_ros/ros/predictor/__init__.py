@@ -1,0 +1,1 @@
+"""predictor_node: where a disc will land, while it flies."""

@@ -1,0 +1,71 @@
+"""Measurements from messages: numbers checked, in `map`."""
+
+from typing import Any
+
+import numpy as np
+
+from disc_sim_ros.arrays import Vector
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation.predictor import Measurement
+from disc_sim_ros.physics.flight_config import NANOSECONDS
+from disc_sim_ros.physics.frames import earth_from_body
+from disc_sim_ros.ros.predictor.options import NodeConfig, is_plain
+
+_SHORTEST_QUATERNION = 1e-6
+_MOST_SIGMA = 10.0  # m, of a covariance that is used
+
+
+def stamp_of(message: Any) -> int:
+    """Return the stamp of a message [ns]."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+def measurement(source: str, message: Any, config: NodeConfig, time: float) -> Measurement:
+    """Return a measurement from a message.
+
+    Args:
+        source: One of `options.SOURCES`.
+        message: PointStamped, PoseStamped, PoseWithCovarianceStamped or Odometry.
+        config: Of the node.
+        time: Of the message [s].
+
+    Raises:
+        ConfigError: Another frame, or numbers that are not finite.
+    """
+    frame = message.header.frame_id or config.frame
+    if frame != config.frame:
+        raise ConfigError(f'{source} header.frame_id', frame, f'give {config.frame}')
+    if source == 'point':
+        return Measurement(time, _in_map(message.point, config))
+    with_covariance = source != 'pose'
+    pose = message.pose.pose if with_covariance else message.pose
+    sigma = _sigma(message.pose.covariance) if with_covariance else None
+    return Measurement(
+        time, _in_map(pose.position, config), _axis(pose.orientation, config), sigma
+    )
+
+
+def _in_map(point: Any, config: NodeConfig) -> Vector:
+    at = (float(point.x), float(point.y), float(point.z))
+    if is_plain(config):
+        return at
+    x, y, z = earth_from_body(config.rotation, at)
+    a, b, c = config.position
+    return x + a, y + b, z + c
+
+
+def _axis(q: Any, config: NodeConfig) -> Vector | None:
+    """Return the direction of z of an orientation in `map`; None for a quaternion of length 0."""
+    norm = float(np.linalg.norm([q.x, q.y, q.z, q.w]))
+    if norm < _SHORTEST_QUATERNION:
+        return None
+    e = (q.w / norm, q.x / norm, q.y / norm, q.z / norm)
+    up = earth_from_body(e, (0.0, 0.0, 1.0))
+    return up if is_plain(config) else earth_from_body(config.rotation, up)
+
+
+def _sigma(covariance: Any) -> float | None:
+    """Return the standard deviation of a position; None where the message gives none."""
+    mean = float(covariance[0] + covariance[7] + covariance[14]) / 3.0
+    return mean**0.5 if 0.0 < mean < _MOST_SIGMA**2 else None

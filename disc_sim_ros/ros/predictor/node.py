@@ -1,0 +1,225 @@
+"""`predictor_node`: predicts where a disc lands, from measurements that arrive while it flies."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+import sys
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import (
+    PointStamped,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Vector3Stamped,
+)
+from nav_msgs.msg import Odometry, Path
+import numpy as np
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
+
+from disc_sim_ros import topics
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation.predictor import Prediction, Predictor
+from disc_sim_ros.physics import sampled
+from disc_sim_ros.physics.flight_config import NANOSECONDS
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.ros import node_main, parameters
+from disc_sim_ros.ros.internals import PolledSubscription
+from disc_sim_ros.ros.predictor import outputs
+from disc_sim_ros.ros.predictor.measured import measurement, stamp_of
+from disc_sim_ros.ros.predictor.options import PREDICTOR_TABLE, node_config
+from disc_sim_ros.ros.qos import MEASUREMENT_QOS, STATE_QOS
+from disc_sim_ros.ros.recorder.polling_thread import PollingThread
+from disc_sim_ros.topics import Frames, PredictorTopic
+
+POLLING_PERIOD = 0.001  # s
+DIAGNOSTIC_PERIOD = 1.0  # s
+_TYPES = {
+    'point': (PointStamped, PredictorTopic.MEASURED_POINT),
+    'pose': (PoseStamped, PredictorTopic.MEASURED_POSE),
+    'pose_with_covariance': (
+        PoseWithCovarianceStamped,
+        PredictorTopic.MEASURED_POSE_WITH_COVARIANCE,
+    ),
+    'odom': (Odometry, topics.ODOM),
+}
+_NOISE_SEED = 0
+
+
+class PredictorNode(Node):
+    """Takes measurements on a thread of its own, and predicts from all that have arrived.
+
+    Attributes:
+        predictions: Number of predictions so far.
+        refused: Number of measurements that were refused so far.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Subscribe and compile; `start` begins to predict, while the node spins.
+
+        Raises:
+            ConfigError: A parameter is not allowed.
+        """
+        super().__init__('predictor_node', **kwargs)
+        parameters.declare(self, PREDICTOR_TABLE)
+        self._config = node_config(parameters.values(self, PREDICTOR_TABLE))
+        self._frames = Frames()
+        self._ground = self._config.predictor.ground_height
+        self._predictor = Predictor(self._config.predictor)
+        self._noise = np.random.default_rng(_NOISE_SEED)
+        self._epoch: int | None = None
+        self._last_profile = -np.inf
+        self._throw = 0
+        self._covariance = np.full((3, 3), np.nan)
+        self.predictions = self.refused = 0
+
+        def publisher(kind: type, name: str) -> Any:
+            return self.create_publisher(kind, name, STATE_QOS)
+
+        self._landing = publisher(PoseWithCovarianceStamped, PredictorTopic.LANDING)
+        self._path = publisher(Path, PredictorTopic.PATH)
+        self._estimate = publisher(Odometry, PredictorTopic.ESTIMATE)
+        self._ellipse = publisher(MarkerArray, PredictorTopic.ELLIPSE)
+        self._intercept = publisher(PoseStamped, PredictorTopic.INTERCEPT)
+        self._wind = publisher(Vector3Stamped, PredictorTopic.WIND)
+        self._diagnostics = publisher(DiagnosticArray, topics.DIAGNOSTICS)
+        self._subscriptions_by_source = {
+            source: PolledSubscription(self, *_TYPES[source], MEASUREMENT_QOS)
+            for source in self._config.sources
+        }
+        parameters.refuse_unused(self)
+        note = sampled.first_call_note()
+        if note:
+            self.get_logger().info(note)
+        self._warm_up()
+        self._thread = PollingThread(self._take, POLLING_PERIOD)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
+        self.get_logger().info(
+            f'ready: {", ".join(self._config.sources)}, {self._config.predictor.setup.disc.name}'
+        )
+
+    def _warm_up(self) -> None:
+        """Load or compile the flights, so that no measurement waits for it."""
+        model = self._config.predictor.model
+        state = np.array([Launch(speed=15.0, height=1.0).state()])
+        rows = model.rows(model.means[None])
+        times = np.array([0.0, 0.1])
+        sampled.fly_sampled(state, rows, model.setup, times, step=model.step, duration=1.0)
+
+    def start(self) -> None:
+        """Start the thread that predicts."""
+        self._thread.start()
+
+    @property
+    def is_working(self) -> bool:
+        """Return True while the thread runs."""
+        return self._thread.is_alive()
+
+    def stop(self) -> str:
+        """End the thread.
+
+        Raises:
+            DiscSimError: It ended early.
+        """
+        self._thread.end()
+        if self._thread.failure is not None:
+            raise self._thread.failure
+        return ''
+
+    # ---- the thread ----
+
+    def _take(self) -> bool:
+        """Take all that has arrived, then predict once: a late node skips, it does not queue."""
+        added = False
+        for source, subscription in self._subscriptions_by_source.items():
+            while (taken := subscription.take()) is not None:
+                added |= self._add(source, taken[0])
+        if added:
+            self._predict()
+        return False
+
+    def _add(self, source: str, message: Any) -> bool:
+        stamp = stamp_of(message)
+        if self._epoch is None:
+            self._epoch = stamp
+        try:
+            m = measurement(source, message, self._config, (stamp - self._epoch) / NANOSECONDS)
+            if self._config.added_noise > 0.0:
+                x, y, z = np.add(m.position, self._noise.normal(0.0, self._config.added_noise, 3))
+                m = type(m)(m.time, (float(x), float(y), float(z)), m.axis, m.position_sigma)
+        except ConfigError as error:
+            self.refused += 1
+            self.get_logger().warning(f'refused: {error}', throttle_duration_sec=1.0)
+            return False
+        return self._predictor.add(m)
+
+    def _predict(self) -> None:
+        newest = self._predictor.newest
+        profiled = not (
+            self._last_profile <= newest < self._last_profile + self._config.ellipse_period
+        )
+        prediction = self._predictor.update(profiled=profiled)
+        if prediction is None:
+            return
+        if profiled:
+            self._last_profile = prediction.time
+        self._publish(prediction, profiled=profiled)
+        self.predictions += 1
+        if prediction.throw != self._throw:
+            self._throw = prediction.throw
+            self.get_logger().info(f'throw {self._throw}: following')
+
+    def _publish(self, p: Prediction, *, profiled: bool) -> None:
+        now, ground, frames = self._stamp(p.time), self._ground, self._frames
+        if profiled:
+            self._covariance = p.covariance
+            self._ellipse.publish(outputs.ellipses(p, now, ground, frames))
+        else:
+            p = replace(p, covariance=self._covariance)
+        self._landing.publish(outputs.landing(p, self._stamp(p.landing_time), ground, frames))
+        self._estimate.publish(outputs.estimate(p, now, ground, frames))
+        self._wind.publish(outputs.wind(p, now, frames))
+        if not profiled or self._config.path_rate <= 0.0:
+            return
+        times, states = self._predictor.path(p, self._config.path_rate)
+        path = outputs.path([self._stamp(t) for t in times], states, ground, frames)
+        self._path.publish(path)
+        crossing = outputs.intercept(path, self._config.intercept_height)
+        if crossing is not None:
+            self._intercept.publish(crossing)
+
+    def _stamp(self, time: float) -> int:
+        return max(0, (self._epoch or 0) + round(time * NANOSECONDS))
+
+    def _publish_diagnostics(self) -> None:
+        values = {
+            'throws': self._predictor.throws,
+            'predictions': self.predictions,
+            'refused measurements': self.refused,
+            'late or repeated measurements': self._predictor.late,
+        }
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK,
+            name=f'{self.get_fully_qualified_name()}: prediction',
+            message='following a throw' if self._predictor.is_following else 'waiting for a throw',
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Predict until Ctrl-C or SIGTERM.
+
+    Returns:
+        The exit code: 0, 1 if the node failed, 2 for bad arguments or parameters.
+    """
+    return node_main.run('predictor_node', PredictorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,125 @@
+"""Messages of a prediction."""
+
+from collections.abc import Sequence
+import math
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped
+from nav_msgs.msg import Odometry, Path
+import numpy as np
+from visualization_msgs.msg import Marker, MarkerArray
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.predictor import Prediction
+from disc_sim_ros.physics.frames import odometry_array, rotation_matrix
+from disc_sim_ros.ros import messages
+from disc_sim_ros.topics import Frames
+
+# Quantiles of chi-squared with two degrees of freedom.
+SHARES = {50: 1.386, 90: 4.605}
+_LOW = 0.02  # m, height of the ellipses over the ground
+_COLOURS = {50: (0.835, 0.369, 0.0, 0.6), 90: (0.835, 0.369, 0.0, 0.25)}
+_FLIP = np.diag([1.0, -1.0, -1.0])
+_LIFETIME = 2  # s, of an ellipse that is not renewed
+
+
+def landing(p: Prediction, stamp: int, ground: float, frames: Frames) -> PoseWithCovarianceStamped:
+    """Return where the disc lands, stamped with the time of the landing [ns]."""
+    m = PoseWithCovarianceStamped()
+    _set(m.header, frames.map, stamp)
+    at = m.pose.pose
+    at.position.x, at.position.y, at.position.z = float(p.landing[0]), float(p.landing[1]), ground
+    at.orientation.w = 1.0
+    covariance = np.zeros((6, 6))
+    covariance[:2, :2] = p.covariance[:2, :2]
+    m.pose.covariance = covariance.ravel().tolist()
+    return m
+
+
+def estimate(p: Prediction, stamp: int, ground: float, frames: Frames) -> Odometry:
+    """Return the estimated state at a measurement [ns]; its covariances have no rotations."""
+    m = Odometry()
+    _set(m.header, frames.map, stamp)
+    m.child_frame_id = frames.disc
+    numbers = odometry_array(p.state)[0].tolist()
+    pose, twist = m.pose.pose, m.twist.twist
+    pose.position.x, pose.position.y, pose.position.z = numbers[0], numbers[1], numbers[2] + ground
+    turn = pose.orientation
+    turn.x, turn.y, turn.z, turn.w = numbers[3:7]
+    twist.linear.x, twist.linear.y, twist.linear.z = numbers[7:10]
+    twist.angular.x, twist.angular.y, twist.angular.z = numbers[10:13]
+    of_pose, of_twist = np.zeros((6, 6)), np.zeros((6, 6))
+    to_map = _FLIP @ rotation_matrix(p.state[6:10]) @ _FLIP  # of `disc`
+    of_pose[:3, :3] = p.state_covariance[:3, :3]
+    of_twist[:3, :3] = to_map.T @ p.state_covariance[3:, 3:] @ to_map
+    m.pose.covariance, m.twist.covariance = of_pose.ravel().tolist(), of_twist.ravel().tolist()
+    return m
+
+
+def path(stamps: Sequence[int], states: FloatArray, ground: float, frames: Frames) -> Path:
+    """Return the rest of the flight, each pose with its own stamp [ns]."""
+    m = Path()
+    _set(m.header, frames.map, stamps[0])
+    for stamp, numbers in zip(stamps, odometry_array(states), strict=True):
+        pose = PoseStamped()
+        _set(pose.header, frames.map, stamp)
+        at, turn = pose.pose.position, pose.pose.orientation
+        at.x, at.y, at.z = float(numbers[0]), float(numbers[1]), float(numbers[2]) + ground
+        turn.x, turn.y, turn.z, turn.w = map(float, numbers[3:7])
+        m.poses.append(pose)
+    return m
+
+
+def intercept(m: Path, height: float) -> PoseStamped | None:
+    """Return where a path crosses a height downwards, with its time; None if it does not."""
+    for a, b in zip(m.poses, m.poses[1:], strict=False):
+        high, low = a.pose.position.z, b.pose.position.z
+        if high >= height > low:
+            share = (high - height) / (high - low)
+            begin, end = _nanoseconds(a), _nanoseconds(b)
+            crossing = PoseStamped()
+            stamp = begin + round(share * (end - begin))
+            _set(crossing.header, a.header.frame_id, stamp)
+            p, q = a.pose.position, b.pose.position
+            crossing.pose.position.x = p.x + share * (q.x - p.x)
+            crossing.pose.position.y = p.y + share * (q.y - p.y)
+            crossing.pose.position.z = height
+            crossing.pose.orientation = a.pose.orientation
+            return crossing
+    return None
+
+
+def wind(p: Prediction, stamp: int, frames: Frames) -> Vector3Stamped:
+    """Return the estimated wind."""
+    m = Vector3Stamped()
+    _set(m.header, frames.map, stamp)
+    m.vector.x, m.vector.y = float(p.wind[0]), float(p.wind[1])
+    return m
+
+
+def ellipses(p: Prediction, stamp: int, ground: float, frames: Frames) -> MarkerArray:
+    """Return the ellipses that hold 50 and 90 % of the landings."""
+    variances, axes = np.linalg.eigh(p.covariance[:2, :2])
+    yaw = math.atan2(axes[1, 1], axes[0, 1])
+    markers = []
+    for i, (share, quantile) in enumerate(SHARES.items()):
+        m = Marker(ns='landing', id=i, type=Marker.CYLINDER, action=Marker.ADD)
+        _set(m.header, frames.map, stamp)
+        m.lifetime.sec = _LIFETIME
+        at = m.pose.position
+        at.x, at.y, at.z = float(p.landing[0]), float(p.landing[1]), ground + _LOW
+        m.pose.orientation.z, m.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+        long, short = (2.0 * math.sqrt(max(v, 1e-6) * quantile) for v in variances[::-1])
+        m.scale.x, m.scale.y, m.scale.z = long, short, _LOW
+        m.color.r, m.color.g, m.color.b, m.color.a = _COLOURS[share]
+        markers.append(m)
+    return MarkerArray(markers=markers)
+
+
+def _set(header: Any, frame: str, stamp: int) -> None:
+    header.frame_id = frame
+    header.stamp.sec, header.stamp.nanosec = messages.stamp(stamp)
+
+
+def _nanoseconds(pose: PoseStamped) -> int:
+    return int(pose.header.stamp.sec) * 1_000_000_000 + int(pose.header.stamp.nanosec)

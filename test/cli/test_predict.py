@@ -1,0 +1,70 @@
+"""predict: CSV files and bags through the predictor."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from disc_sim_ros.cli import predict
+from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.physics.disc_file import load_disc
+from disc_sim_ros.physics.flight import Setup
+from estimation.synthetic_throws import throw
+
+SAMPLE = Path(__file__).parents[2] / 'samples/fig5'
+FIG5_LANDING = (25.75, -1.67)  # m, of analyse_bag
+
+
+@pytest.fixture(scope='module')
+def csv(tmp_path_factory):
+    flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 6, rate=30.0)
+    file = tmp_path_factory.mktemp('predict') / 'throw.csv'
+    rows = (f'{t},{x},{y},{z}\n' for t, (x, y, z) in zip(flown.time, flown.position, strict=True))
+    file.write_text('t_s,x_m,y_m,z_m\n' + ''.join(rows))
+    return file, flown
+
+
+def test_csv_gives_the_landing_and_a_plot(csv, tmp_path, capsys):
+    file, flown = csv
+    plot = tmp_path / 'miss.png'
+    assert predict.main([str(file), '--disc-uncertainty', '0', '--json', '--plot', str(plot)]) == 0
+    (document,) = json.loads(capsys.readouterr().out)['throws']
+    assert document['landing_m'] == pytest.approx(flown.landing[:2], abs=0.06)  # noise of 2 cm
+    assert document['to_the_landing']
+    misses = [row['miss_m'] for row in document['predictions']]
+    assert misses[-1] < misses[0]
+    assert plot.read_bytes().startswith(b'\x89PNG')
+
+
+def test_bag_of_the_simulator_gives_its_landing(capsys):
+    assert predict.main([str(SAMPLE), '--disc', 'frisbee', '--throw-spin', '31']) == 0
+    first, *rest = capsys.readouterr().out.splitlines()
+    x, y = FIG5_LANDING
+    assert f'x {x:.2f} m, y {y:.2f} m' in first
+    assert any(line.strip().startswith('1.0') for line in rest)
+
+
+@pytest.mark.parametrize(
+    ('content', 'error'),
+    [
+        ('t_s,x_m,y_m\n0,0,0\n', 'z_m'),
+        ('t_s,x_m,y_m,z_m\n0,0,0,high\n', "row 1, z_m: 'high'"),
+        ('t_s,x_m,y_m,z_m\n', 'no rows'),
+    ],
+)
+def test_bad_files_are_refused(tmp_path, capsys, content, error):
+    file = tmp_path / 'bad.csv'
+    file.write_text(content)
+    with pytest.raises(SystemExit) as ended:
+        predict.main([str(file)])
+    assert ended.value.code == 2
+    message = capsys.readouterr().err
+    assert error in message
+    assert message.count('\n') == 1
+
+
+def test_measurements_without_a_throw_are_a_failure(tmp_path, capsys):
+    file = tmp_path / 'still.csv'
+    file.write_text('t_s,x_m,y_m,z_m\n' + ''.join(f'{i / 60},0,0,1\n' for i in range(60)))
+    assert predict.main([str(file)]) == 1
+    assert 'no throw in 60 measurements' in capsys.readouterr().err

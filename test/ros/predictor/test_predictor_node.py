@@ -1,0 +1,168 @@
+"""predictor_node: its parameters, its measurements from messages, and the node itself."""
+
+import math
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry, Path
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from visualization_msgs.msg import MarkerArray
+
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.physics.disc_file import load_disc
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.ros.predictor.measured import measurement
+from disc_sim_ros.ros.predictor.node import PredictorNode
+from disc_sim_ros.ros.predictor.options import node_config
+from disc_sim_ros.ros.qos import STATE_QOS
+from disc_sim_ros.topics import PredictorTopic
+from estimation.synthetic_throws import throw
+from ros.sim_process import DEADLINE
+
+pytestmark = pytest.mark.ros
+
+
+def pose(t: float, position, axis=None) -> PoseStamped:
+    """Return a message; a tilt of z to `axis`, or no attitude."""
+    m = PoseStamped()
+    m.header.frame_id = 'map'
+    m.header.stamp.sec, m.header.stamp.nanosec = divmod(round(t * 1e9), 10**9)
+    m.pose.position.x, m.pose.position.y, m.pose.position.z = map(float, position)
+    q = m.pose.orientation
+    q.w = 0.0
+    if axis is not None:
+        a = np.asarray(axis) / np.linalg.norm(axis)
+        e = np.array([-a[1], a[0], 0.0, 1.0 + a[2]])
+        q.x, q.y, q.z, q.w = (e / np.linalg.norm(e)).tolist()
+    return m
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'allowed'),
+    [
+        ('sources', 'odom camera', 'point, pose'),
+        ('sources', '', 'point, pose'),
+        ('position_sigma', 0.0, '0.0001'),
+        ('disc', 'frisby', 'frisbee'),
+        ('ellipse_rat', 1.0, 'ellipse_rate'),
+        ('wind', (1.0, 2.0), '3 numbers'),
+    ],
+)
+def test_bad_parameters_are_refused(name, value, allowed):
+    with pytest.raises(ConfigError, match=allowed):
+        node_config({name: value})
+
+
+def test_measurement_is_turned_into_map():
+    """A frame at (1, 2, 3), turned by 90 degrees about z: its x is y of map."""
+    values = {'frame_position': (1.0, 2.0, 3.0), 'frame_rotation': (0.0, 0.0, 90.0)}
+    config = node_config({**values, 'measurement_frame': 'camera'})
+    m = pose(0.0, (5.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    m.header.frame_id = 'camera'
+    turned = measurement('pose', m, config, 0.0)
+    assert turned.position == pytest.approx((1.0, 7.0, 3.0))
+    assert turned.axis == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+
+
+def test_measurement_of_another_frame_is_refused():
+    m = pose(0.0, (0.0, 0.0, 1.0))
+    m.header.frame_id = 'camera'
+    with pytest.raises(ConfigError, match='camera'):
+        measurement('pose', m, node_config({}), 0.0)
+
+
+def test_covariance_gives_the_standard_deviation():
+    m = PoseWithCovarianceStamped()
+    m.pose.covariance[0] = m.pose.covariance[7] = m.pose.covariance[14] = 0.09
+    assert measurement(
+        'pose_with_covariance', m, node_config({}), 0.0
+    ).position_sigma == pytest.approx(0.3)
+
+
+def test_node_follows_a_throw(ros_context):
+    """A throw with attitudes, with its own stamps; a pose that is not finite between them."""
+    flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 4)
+    known = Parameter('disc_uncertainty', value=0.0)
+    node = PredictorNode(context=ros_context, parameter_overrides=[known])
+    peer = Node('tracker', context=ros_context, start_parameter_services=False)
+    executor = SingleThreadedExecutor(context=ros_context)
+    executor.add_node(node)
+    executor.add_node(peer)
+    got = {name: [] for name in ('landing', 'path', 'ellipse', 'estimate', 'intercept')}
+    for name, kind, topic in (
+        ('landing', PoseWithCovarianceStamped, PredictorTopic.LANDING),
+        ('path', Path, PredictorTopic.PATH),
+        ('ellipse', MarkerArray, PredictorTopic.ELLIPSE),
+        ('estimate', Odometry, PredictorTopic.ESTIMATE),
+        ('intercept', PoseStamped, PredictorTopic.INTERCEPT),
+    ):
+        peer.create_subscription(kind, topic, got[name].append, STATE_QOS)
+    publisher = peer.create_publisher(PoseStamped, PredictorTopic.MEASURED_POSE, STATE_QOS)
+
+    def spin_until(condition):
+        end = time.monotonic() + DEADLINE
+        while not condition():
+            assert time.monotonic() < end
+            executor.spin_once(0.01)
+
+    spin_until(
+        lambda: publisher.get_subscription_count() and node.count_subscribers('predicted_landing')
+    )
+    node.start()
+    try:
+        publisher.publish(pose(100.0, (math.nan, 0.0, 1.0)))
+        spin_until(lambda: node.refused == 1)
+        for t, position, axis in zip(flown.time, flown.position, flown.axis, strict=True):
+            publisher.publish(pose(100.0 + t, position, axis))
+            executor.spin_once(0.01)
+        end = 100.0 + flown.landing[2]
+        spin_until(lambda: got['estimate'] and stamp(got['estimate'][-1]) > end - 0.03)
+        spin_until(lambda: got['path'] and got['intercept'] and got['ellipse'])
+    finally:
+        assert node.stop() == ''
+        executor.shutdown()
+        node.destroy_node()
+        peer.destroy_node()
+    last = got['landing'][-1]
+    at = last.pose.pose.position
+    assert math.dist((at.x, at.y), flown.landing[:2]) < 0.1  # noise of 2 cm
+    assert stamp(last) == pytest.approx(end, abs=0.03)
+    assert last.header.frame_id == 'map'
+    covariance = np.reshape(last.pose.covariance, (6, 6))[:2, :2]
+    assert (np.linalg.eigvalsh(covariance) > 0.0).all()
+    first = np.reshape(got['landing'][0].pose.covariance, (6, 6))[:2, :2]
+    assert np.trace(covariance) < 0.1 * np.trace(first)  # the ellipse shrinks
+    assert len(got['ellipse'][0].markers) == 2
+    path = got['path'][0].poses
+    times = [stamp(p) for p in path]
+    assert times == sorted(times)
+    assert path[-1].pose.position.z == pytest.approx(0.0, abs=0.15)  # the rim touches first
+    assert got['intercept'][0].pose.position.z == 1.0
+
+
+def stamp(message) -> float:
+    return message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+
+
+def test_bad_parameter_ends_the_program(ros_environment):
+    words = ['--ros-args', '-p', 'position_sigma:=-1.0']
+    done = subprocess.run(
+        [sys.executable, '-m', 'disc_sim_ros.ros.predictor', *words],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith('predictor_node: error: position_sigma')
+    assert done.stderr.count('\n') == 1
