@@ -1,6 +1,8 @@
-"""Units that a user may write behind a number, such as '60mph', and their factors to SI."""
+"""Units and their factors to SI: those that a user may write, such as '60mph', and nanoseconds."""
 
 from math import pi
+
+NANOSECONDS = 1_000_000_000  # per second
 
 # By the unit of a quantity in `quantities`: the units that may stand behind its number. Exact by
 # definition: the inch is 25.4 mm, the nautical mile 1852 m, the pound 0.45359237 kg.

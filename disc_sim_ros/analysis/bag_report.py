@@ -14,7 +14,8 @@ from disc_sim_ros.analysis.flight_report import sideways
 from disc_sim_ros.analysis.recording import Began, Change, Flight
 from disc_sim_ros.errors import printable
 from disc_sim_ros.physics import frames, theory
-from disc_sim_ros.physics.flight_config import NANOSECONDS, Key
+from disc_sim_ros.physics.flight_config import Key
+from disc_sim_ros.units import NANOSECONDS
 
 _SETUP = (
     Key.DISC,

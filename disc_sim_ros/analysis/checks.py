@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from disc_sim_ros.analysis.flights import velocities
 from disc_sim_ros.analysis.odometry import Motion, usable
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.flight_config import NANOSECONDS
+from disc_sim_ros.units import NANOSECONDS
 
 UNIT = 1e-3  # largest deviation of a quaternion from length 1; sim_node takes the same
 FITTING = 0.05  # of the speed; largest difference of velocity and differences of position

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from disc_sim_ros.analysis.odometry import Motion
 from disc_sim_ros.analysis.recording import END_OF_BAG, THROWN_AGAIN, Began, Disc, Event, Flight
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.topics import FlightEvent
+from disc_sim_ros.units import NANOSECONDS
 
 GAP = 0.5  # s without a message, or ten times the usual distance of messages where that is more
 JUMP = 1.0  # m between two messages beyond what the velocity explains

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.bags.reader import RawMessage
 from disc_sim_ros.errors import BagError
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.topics import MessageType
+from disc_sim_ros.units import NANOSECONDS
 
 ODOMETRY, POSE = MessageType.ODOMETRY, MessageType.POSE
 COMPONENTS = (

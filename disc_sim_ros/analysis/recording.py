@@ -16,7 +16,6 @@ from disc_sim_ros.bags.reader import Bag, Message
 from disc_sim_ros.bags.topic import full_type
 from disc_sim_ros.errors import BagError
 from disc_sim_ros.physics.flight_config import (
-    NANOSECONDS,
     EventKey,
     Key,
     document_of,
@@ -25,6 +24,7 @@ from disc_sim_ros.physics.flight_config import (
 )
 from disc_sim_ros.physics.frames import odometry_array
 from disc_sim_ros.topics import FlightEvent, Frames
+from disc_sim_ros.units import NANOSECONDS
 
 END_OF_BAG, THROWN_AGAIN = 'end of the bag', 'thrown again'
 # The numbers that a release message and a configuration have in common. Not p and q, 10 and 11:

@@ -13,7 +13,6 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import DiscSimError, IntegrationError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight_config import (
-    NANOSECONDS,
     FlightConfig,
     Landing,
     from_document,
@@ -23,6 +22,7 @@ from disc_sim_ros.physics.flight_config import (
 from disc_sim_ros.physics.kernels.equations import DISC_AIR
 from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.topics import Frames
+from disc_sim_ros.units import NANOSECONDS
 
 _ROUNDED = 2  # ns by which a stamp may miss its step: stamps are rounded down
 

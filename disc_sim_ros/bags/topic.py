@@ -7,11 +7,11 @@ from typing import Any
 import yaml
 
 from disc_sim_ros.errors import BagError
+from disc_sim_ros.units import NANOSECONDS
 
 # The C one is many times faster; not every build of PyYAML has it.
 LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 INFINITE = 9223372036854775807  # ns: 9223372036 s and 854775807 ns, rmw's RMW_DURATION_INFINITE
-_SECOND = 1_000_000_000  # ns
 _FOXY_INFINITE = ((2147483647, 4294967295), (2147483647, 2147483647))  # sec, nsec in old bags
 
 # rmw/types.h: the place of a word is its number; bags before Jazzy hold numbers.
@@ -135,7 +135,7 @@ def _item(qos: Qos) -> list[str]:
 
 
 def _time(name: str, nanoseconds: int) -> list[str]:
-    sec, nsec = divmod(nanoseconds, _SECOND)
+    sec, nsec = divmod(nanoseconds, NANOSECONDS)
     return [f'  {name}:', f'    sec: {sec}', f'    nsec: {nsec}']
 
 
@@ -165,4 +165,4 @@ def _nanoseconds(time: Any) -> int:
     sec, nsec = int(time['sec']), int(time['nsec'])
     if (sec, nsec) in _FOXY_INFINITE:
         return INFINITE
-    return min(sec * _SECOND + nsec, INFINITE)
+    return min(sec * NANOSECONDS + nsec, INFINITE)

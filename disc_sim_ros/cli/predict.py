@@ -15,6 +15,7 @@ from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.quantities import MEAN_WIND, PREDICTION
+from disc_sim_ros.units import NANOSECONDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,7 +120,6 @@ def _of_bag(source: Path, topic: str | None) -> 'list[Measurement]':
     from disc_sim_ros.analysis import recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
     from disc_sim_ros.estimation import replay  # noqa: PLC0415
-    from disc_sim_ros.physics.flight_config import NANOSECONDS  # noqa: PLC0415
 
     discs = recording.discs(open_bag(source), topic)
     if len(discs) > 1:

@@ -24,9 +24,7 @@ from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.simulator import FlightSimulator
-
-NANOSECONDS = 1_000_000_000  # per second
-
+from disc_sim_ros.units import NANOSECONDS
 
 # ---- configuration ----
 

@@ -17,7 +17,6 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames as paper_frames
 from disc_sim_ros.physics import imu as ideal_imu
 from disc_sim_ros.physics import trajectory
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.kernels.rotation import Quaternion
@@ -31,6 +30,7 @@ from disc_sim_ros.quantities import (
     VELOCITY,
 )
 from disc_sim_ros.topics import Frames
+from disc_sim_ros.units import NANOSECONDS
 from disc_sim_ros.validation import Quantity
 
 _VECTOR = ('x', 'y', 'z')

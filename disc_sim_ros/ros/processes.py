@@ -16,7 +16,11 @@ from disc_sim_ros.errors import DiscSimError
 
 DOMAINS = range(1, 102)  # the ports of Fast DDS for higher ones are ephemeral ports of Linux
 END = 30.0  # s for a process to end after its signal
-_MODULES = {'sim_node': 'disc_sim_ros.ros.sim', 'recorder_node': 'disc_sim_ros.ros.recorder'}
+_MODULES = {
+    'sim_node': 'disc_sim_ros.ros.sim',
+    'recorder_node': 'disc_sim_ros.ros.recorder',
+    'live_view': 'disc_sim_ros.ros.live',
+}
 
 
 @contextmanager
@@ -94,7 +98,7 @@ class Process:
         """Start it.
 
         Args:
-            program: 'sim_node' or 'recorder_node'.
+            program: 'sim_node', 'recorder_node' or 'live_view'.
             parameters: Parameters of the node.
             folder: Folder for its parameter file and its log.
             arguments: More arguments for ROS, such as '-r' and '__ns:=/red'.

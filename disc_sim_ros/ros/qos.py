@@ -20,6 +20,8 @@ LATCHED_QOS = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)  # a late subscribe
 COMMAND_QOS = _reliable(100)
 # Measurements, of reliable and of best-effort publishers.
 MEASUREMENT_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+# A page shows the newest message alone, and takes it from any publisher.
+NEWEST_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 CLOCK_QOS = _reliable(1)  # only the newest time counts; best-effort subscribers get it as well
 CLOCK_PERIOD = 0.005  # s of wall time; a node that follows it spends 14 % of a core at 250 Hz
 

@@ -15,6 +15,7 @@ import pytest
 
 rclpy = pytest.importorskip('rclpy')
 
+from disc_sim_ros.ros.processes import started  # noqa: E402 - needs rclpy
 from ros.sim_process import DEADLINE  # noqa: E402 - needs rclpy
 from security.policies import read_policy  # noqa: E402 - as above
 
@@ -79,6 +80,20 @@ def test_the_recorder_opens_what_its_policy_allows(ros, tmp_path):
     assert policy.publish - {'ros_discovery_info'} == publish
     services = {topic for topic in subscribe if topic.startswith(('rq', 'rr'))}
     assert services == {topic for topic in policy.subscribe if topic.startswith(('rq', 'rr'))}
+
+
+def test_live_view_opens_what_its_policy_allows_and_nothing_else(ros, tmp_path):
+    pytest.importorskip('trimesh')
+    pytest.importorskip('websockets.asyncio')
+    policy = read_policy('live_view')
+    ros.start({'auto_throw': False})
+    needed = policy.subscribe - {'ros_discovery_info'}
+    with started('live_view', {'port': 0}, tmp_path) as live:
+        ros.spin_until(lambda: needed <= opened(ros.node, 'live_view')[1], 'all subscriptions')
+        publish, subscribe = opened(ros.node, 'live_view')
+        live.end()
+    assert publish == policy.publish - {'ros_discovery_info'}
+    assert subscribe == needed
 
 
 def _has_plugins():

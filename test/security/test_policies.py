@@ -15,15 +15,20 @@ SET_PARAMETERS = {
     for node in ('sim_node', 'recorder_node')
     for name in ('set_parameters', 'set_parameters_atomically')
 }
+# The parameters of live_view are fixed from its start: no enclave needs to set them.
+PARAMETERS_OF_LIVE_VIEW = {
+    f'rq/live_view/{name}Request' for name in ('set_parameters', 'set_parameters_atomically')
+}
 OF_EVERY_NODE = {'ros_discovery_info', 'rt/rosout', 'rt/parameter_events'}
 
 
-def test_only_the_controller_steers_and_only_the_operator_throws_and_sets_parameters():
-    restricted = COMMANDS | SERVICES | SET_PARAMETERS
+def test_only_the_controller_steers_and_only_the_operator_sets_parameters():
+    restricted = COMMANDS | SERVICES | SET_PARAMETERS | PARAMETERS_OF_LIVE_VIEW
     assert {name: e.publish & restricted for name, e in ENCLAVES.items()} == {
         'sim_node': set(),
         'recorder_node': set(),
         'viewer': set(),
+        'live_view': {'rt/throw'},
         'controller': {'rt/cmd_moment', 'rt/cmd_coefficients'},
         'operator': {'rt/throw', 'rt/wind'} | SERVICES | SET_PARAMETERS,
     }

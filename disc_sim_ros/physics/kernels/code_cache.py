@@ -47,6 +47,8 @@ def cache_folder() -> Path | None:
     """Return the writable cache folder of these very sources, or None where there is none."""
     home = os.environ.get('NUMBA_CACHE_DIR') or os.environ.get('XDG_CACHE_HOME')
     try:
+        if not home and not Path.home().is_dir():
+            return None  # a home directory is never made
         base = Path(home) if home else Path.home() / '.cache'
         folder = base / 'disc_sim_ros' / SOURCE_DIGEST
         if not folder.is_dir():

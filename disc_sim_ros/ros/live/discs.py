@@ -7,21 +7,20 @@ from typing import Any
 from geometry_msgs.msg import PoseWithCovarianceStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics import flight_config, frames
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.physics.kernels.equations import State, Velocity
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 from disc_sim_ros.physics.trajectory import quantities
 from disc_sim_ros.ros.internals import PolledSubscription
-from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS
+from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS, NEWEST_QOS
+from disc_sim_ros.units import NANOSECONDS
 from disc_sim_ros.view.shown import LEVEL, System
 
-NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 RARELY = 6  # updates between two looks at topics that change little
 DIAMETER = 0.27  # m, of a disc whose configuration is not known
 _PLACES = 4  # behind the point, of what the page gets
@@ -43,7 +42,7 @@ class LiveDisc:
         self.child_frame = ''
         self.frame = ''
 
-        def newest(kind: type, name: str, qos: QoSProfile = NEWEST) -> PolledSubscription:
+        def newest(kind: type, name: str, qos: QoSProfile = NEWEST_QOS) -> PolledSubscription:
             return PolledSubscription(node, kind, f'{namespace}/{name}', qos)
 
         self.throw = node.create_publisher(Odometry, f'{namespace}/{topics.THROW}', COMMAND_QOS)

@@ -7,9 +7,9 @@ import numpy as np
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.predictor import Measurement
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.physics.frames import earth_from_body
 from disc_sim_ros.ros.predictor.options import NodeConfig, is_plain
+from disc_sim_ros.units import NANOSECONDS
 
 _SHORTEST_QUATERNION = 1e-6
 _MOST_SIGMA = 10.0  # m, of a covariance that is used

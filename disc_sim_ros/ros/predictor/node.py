@@ -23,7 +23,6 @@ from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.predictor import Prediction, Predictor
 from disc_sim_ros.physics import sampled
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.internals import PolledSubscription
@@ -33,6 +32,7 @@ from disc_sim_ros.ros.predictor.options import PREDICTOR_TABLE, node_config
 from disc_sim_ros.ros.qos import MEASUREMENT_QOS, STATE_QOS
 from disc_sim_ros.ros.recorder.polling_thread import PollingThread
 from disc_sim_ros.topics import Frames, PredictorTopic
+from disc_sim_ros.units import NANOSECONDS
 
 POLLING_PERIOD = 0.001  # s
 DIAGNOSTIC_PERIOD = 1.0  # s

@@ -14,6 +14,7 @@ from disc_sim_ros.estimation.predictor import Prediction
 from disc_sim_ros.physics.frames import odometry_array, rotation_matrix
 from disc_sim_ros.ros import messages
 from disc_sim_ros.topics import Frames
+from disc_sim_ros.units import NANOSECONDS
 
 # Quantiles of chi-squared with two degrees of freedom.
 SHARES = {50: 1.386, 90: 4.605}
@@ -122,4 +123,4 @@ def _set(header: Any, frame: str, stamp: int) -> None:
 
 
 def _nanoseconds(pose: PoseStamped) -> int:
-    return int(pose.header.stamp.sec) * 1_000_000_000 + int(pose.header.stamp.nanosec)
+    return int(pose.header.stamp.sec) * NANOSECONDS + int(pose.header.stamp.nanosec)

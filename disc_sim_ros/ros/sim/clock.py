@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-NANOSECONDS = 1_000_000_000
+from disc_sim_ros.units import NANOSECONDS
 
 
 class SimClock:

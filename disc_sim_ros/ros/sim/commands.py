@@ -16,7 +16,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.kernels.equations import DISC_AIR, Control
 from disc_sim_ros.ros import messages, qos
 from disc_sim_ros.ros.internals import PolledSubscription, Taken
-from disc_sim_ros.ros.sim.clock import NANOSECONDS
+from disc_sim_ros.units import NANOSECONDS
 
 MOST_WAITING = 1000  # commands stamped in the future, of one topic
 END_OF_TIME = 2_145_916_800  # s; 2038-01-01, shortly before stamps of ROS end

@@ -4,9 +4,9 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from disc_sim_ros.ros.sim.clock import NANOSECONDS
 from disc_sim_ros.ros.sim.loop import SimLoop
 from disc_sim_ros.ros.sim.simulation import FAR
+from disc_sim_ros.units import NANOSECONDS
 
 LATE = 0.01  # s; a worse lateness in a period is a warning
 

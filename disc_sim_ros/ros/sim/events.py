@@ -4,10 +4,11 @@ from dataclasses import dataclass, field
 import math
 
 from disc_sim_ros.errors import IntegrationError
-from disc_sim_ros.physics.flight_config import NANOSECONDS, EventKey, exact_seconds, landing_of
+from disc_sim_ros.physics.flight_config import EventKey, exact_seconds, landing_of
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.topics import FlightEvent
+from disc_sim_ros.units import NANOSECONDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,10 @@ from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.kernels.equations import DISC_AIR
 from disc_sim_ros.physics.simulator import FlightSimulator
-from disc_sim_ros.ros.sim.clock import NANOSECONDS, SimClock
+from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import ActiveControl, Commands, pop_due
 from disc_sim_ros.ros.sim.publishers import Publishers
+from disc_sim_ros.units import NANOSECONDS
 
 _NO_MOMENT = (0.0, 0.0, 0.0, DISC_AIR)
 _NO_COEFFICIENTS = (0.0, 0.0, 0.0)

@@ -17,7 +17,6 @@ from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics import simulator
 from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.signals import exit_on_signal
-from disc_sim_ros.ros.sim.clock import NANOSECONDS
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import SimConfig, configuration
 from disc_sim_ros.ros.sim.diagnostics import SimDiagnostics
@@ -26,6 +25,7 @@ from disc_sim_ros.ros.sim.parameters import TABLE
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.services import create_services
 from disc_sim_ros.ros.sinks import PublisherSinkFactory
+from disc_sim_ros.units import NANOSECONDS
 
 DIAGNOSTIC_PERIOD = 1.0  # s
 WARNING_PERIOD = 1.0  # s, between two warnings about the same thing

@@ -17,12 +17,12 @@ from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.ros.cdr_template import CdrTemplate
 from disc_sim_ros.ros.qos import discovered_qos
-from disc_sim_ros.ros.sim.clock import NANOSECONDS
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import SimConfig
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.simulation import Simulation
 from disc_sim_ros.topics import Frames
+from disc_sim_ros.units import NANOSECONDS
 
 NODE_NAME = 'sim_node'
 

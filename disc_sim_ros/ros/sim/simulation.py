@@ -17,13 +17,14 @@ from disc_sim_ros.physics.kernels.equations import State, Velocity
 from disc_sim_ros.physics.simulator import NOTHING, FlightSimulator
 from disc_sim_ros.ros import messages
 from disc_sim_ros.ros.sim import events
-from disc_sim_ros.ros.sim.clock import NANOSECONDS, SimClock
+from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import Commands, CommandTopic, pop_due
 from disc_sim_ros.ros.sim.config import SimConfig
 from disc_sim_ros.ros.sim.events import Event
 from disc_sim_ros.ros.sim.imu import ImuErrors
 from disc_sim_ros.ros.sim.inputs import Inputs
 from disc_sim_ros.ros.sim.publishers import Publishers
+from disc_sim_ros.units import NANOSECONDS
 
 FAR = NANOSECONDS  # a command further ahead is probably stamped by another clock
 _AT_ONCE = ('real_time_factor', 'command_timeout', 'throw_period', 'path_rate')

@@ -23,7 +23,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 import browser
-from disc_sim_ros import Launch, Setup, fly, load_disc
+from disc_sim_ros import Launch, Setup, fly, load_disc, topics
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.ros.live import discs
@@ -226,7 +226,7 @@ def test_the_states_are_those_of_the_flight(ros, live):
         assert 'no simulator' in answer(viewer, disc='/red', token=token)
         prediction = PoseWithCovarianceStamped()
         prediction.pose.pose.position.x = 17.0
-        ros.publisher(PoseWithCovarianceStamped, discs.PREDICTED_LANDING).publish(prediction)
+        ros.publisher(PoseWithCovarianceStamped, topics.PredictorTopic.LANDING).publish(prediction)
         flown = states(viewer, lambda s: s[-1]['t'] >= expected.time - 1e-3)
     assert sim.process.poll() is None
     assert [17.0, 0.0, 0.0] in [state.get('landing') for state in flown]

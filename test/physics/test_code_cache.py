@@ -1,0 +1,101 @@
+"""The cache of machine code: without a place, on a full disk, at first starts at the same time."""
+
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+import pytest
+
+from disc_sim_ros.physics.kernels import jit
+
+pytestmark = pytest.mark.skipif(not jit.COMPILED, reason='without compilation there is no cache')
+SCRIPT = """
+import resource, signal, sys
+if 'full' in sys.argv:  # no file may grow beyond 1 kB: writing fails as on a full disk
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+if 'upgraded' in sys.argv:
+    import numba
+    numba.__version__ = '99.0'
+from disc_sim_ros.physics.kernels.code_cache import cache_folder
+from disc_sim_ros.physics.kernels.jit import entry
+@entry
+def triple(x):
+    return 3.0 * x
+print(triple(2.0), sum(triple.stats.cache_hits.values()), cache_folder())
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Return a function that starts a program with one kernel, in an environment of its own."""
+    script = tmp_path / 'script.py'
+    script.write_text(SCRIPT, encoding='utf-8')
+    places = {'HOME', 'NUMBA_CACHE_DIR', 'XDG_CACHE_HOME'}
+    others = {name: value for name, value in os.environ.items() if name not in places}
+
+    def start(*words, **environment):
+        return subprocess.Popen(
+            [sys.executable, '-W', 'error', script, *words], env=others | environment,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    return start
+
+
+def result_of(process):
+    """Return the number, the hits in the cache and its folder; then what went to stderr."""
+    stdout, stderr = process.communicate(timeout=120)
+    assert process.returncode == 0, stderr
+    return tuple(stdout.split()), stderr
+
+
+def test_a_home_that_does_not_exist_is_not_made(start, tmp_path):
+    home = tmp_path / 'gone'
+    assert result_of(start(HOME=str(home))) == (('6.0', '0', 'None'), '')
+    assert not home.exists()
+
+
+def test_a_home_has_the_cache(start, tmp_path):
+    (_, _, folder), stderr = result_of(start(HOME=str(tmp_path)))
+    assert Path(folder).parent == tmp_path / '.cache/disc_sim_ros'
+    assert stderr == ''
+
+
+@pytest.mark.parametrize('kind', ['NUMBA_CACHE_DIR', 'XDG_CACHE_HOME'])
+def test_where_no_folder_can_be_made_the_machine_code_stays_in_memory(start, tmp_path, kind):
+    """/proc is read-only, also for root, whom permissions do not stop."""
+    file = tmp_path / 'file'
+    file.touch()
+    for place in ('/proc/nowhere', str(file)):
+        assert result_of(start(**{kind: place})) == (('6.0', '0', 'None'), '')
+
+
+def test_a_full_disk_costs_one_line_and_the_next_start_is_sound(start, tmp_path):
+    place = {'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
+    (number, hits, _), stderr = result_of(start('full', **place))
+    assert (number, hits) == ('6.0', '0')
+    assert re.fullmatch(r'[^\n]*cannot keep machine code: [^\n]*File too large[^\n]*\n', stderr)
+    assert result_of(start(**place))[0][:2] == ('6.0', '0')
+    (number, hits, _), stderr = result_of(start(**place))
+    assert (number, hits, stderr) == ('6.0', '1', '')
+
+
+def test_first_starts_at_once_do_not_disturb_each_other(start, tmp_path):
+    place = {'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
+    for process in [start(**place) for _ in range(3)]:
+        (number, _, _), stderr = result_of(process)
+        assert (number, stderr) == ('6.0', '')
+    (number, hits, _), stderr = result_of(start(**place))
+    assert (number, hits, stderr) == ('6.0', '1', '')
+
+
+def test_another_numba_has_a_folder_of_its_own(start, tmp_path):
+    place = {'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
+    before, _ = result_of(start(**place))
+    after, stderr = result_of(start('upgraded', **place))
+    assert (after[:2], stderr) == (('6.0', '0'), '')
+    assert after[2] != before[2]
+    assert result_of(start(**place))[0] == ('6.0', '1', before[2])
