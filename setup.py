@@ -15,6 +15,7 @@ EXECUTABLES = {
     'demo': 'disc_sim_ros.cli.demo:main',
     'disc-sim': 'disc_sim_ros.cli.disc_sim:main',
     'fly': 'disc_sim_ros.cli.fly:main',
+    'identify': 'disc_sim_ros.cli.identify:main',
     'live_view': 'disc_sim_ros.cli.live_view:main',
     'optimise': 'disc_sim_ros.cli.optimise:main',
     'paper_figures': 'disc_sim_ros.cli.paper_figures:main',

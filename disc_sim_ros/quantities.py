@@ -192,6 +192,61 @@ ORIENTATION = Quantity(
     'orientation', '', -2.0, 2.0, None, 'Component of a quaternion before its length is checked'
 )
 
+# What `identify` finds. The bounds exclude what no disc has: a thin wing has a lift slope of at
+# most 2 pi, and the printed damping of the paper is 10 times that of its figures.
+COEFFICIENTS = _table(
+    Quantity('C_L0', '', -0.4, 0.8, None, 'Lift coefficient at angle of attack 0'),
+    Quantity('C_L_slope', '1/rad', 0.5, 6.3, None, 'Mean lift slope from 0 to 10 degrees'),
+    Quantity('C_D0', '', 0.01, 0.5, None, 'Drag coefficient at angle of attack 0'),
+    Quantity('C_D_rise', '', 0.2, 5.0, None, 'Factor of the drag above C_D0, of the base disc'),
+    Quantity('C_M0', '', -0.2, 0.2, None, 'Pitching moment at angle of attack 0'),
+    Quantity('C_M_slope', '1/rad', -0.5, 1.5, None, 'Mean moment slope from 0 to 10 degrees'),
+    Quantity('damping', '', 0.0, 30.0, None, 'Factor of C_Lp and C_Mq of the base disc'),
+    DAMPING['C_Nr'].within(-0.1),
+    Quantity('I_ratio', '', 1.5, 2.0, None, 'I_z / I_x, which sets how fast the disc wobbles'),
+)
+IDENTIFICATION = _table(
+    Quantity(
+        'camera_height',
+        'm',
+        1.0,
+        1000.0,
+        None,
+        'Height of the camera straight above the field, for positions without z',
+    ),
+    Quantity(
+        'camera_error',
+        'm',
+        1e-3,
+        1000.0,
+        5.0,
+        'Standard error of the point under the camera, which is taken as the origin of map',
+    ),
+    Quantity('wind_error', 'm/s', 1e-3, 30.0, 3.0, 'Standard error of --wind'),
+    Quantity(
+        'accelerometer_range',
+        'm/s^2',
+        1.0,
+        1e5,
+        None,
+        'Range of the accelerometer; samples at its end are not used',
+    ),
+    Quantity('starts', '', 1, 100, 2, 'Sets of coefficients to start from', whole=True),
+    Quantity('start_seed', '', 0, LARGEST_SEED, 0, 'Seed of these sets', whole=True),
+)
+# How much discs of one kind differ, one standard deviation: what `identify` believes beforehand.
+COEFFICIENT_SPREAD = {
+    'C_L0': 0.1,
+    'C_L_slope': 0.7,
+    'C_D0': 0.03,
+    'C_D_rise': 0.4,
+    'C_M0': 0.02,
+    'C_M_slope': 0.15,
+    'damping': 2.0,
+    'C_Nr': 5e-3,
+    'I_ratio': 0.05,
+}
+
 # What may differ from flight to flight of an ensemble; the columns of studies.
 AERO_CHANGES = _table(
     Quantity('lift_factor', '', 0.0, 10.0, 1.0, 'Factor of the lift coefficient'),
@@ -409,6 +464,8 @@ QUANTITIES = {
     **DISC,
     **DAMPING,
     **LINEAR_AERO,
+    **COEFFICIENTS,
+    **IDENTIFICATION,
     **CONTROL_MOMENT,
     **TIMING,
     **IMU,

@@ -104,6 +104,7 @@ class MessageType:
 
     ODOMETRY = 'nav_msgs/msg/Odometry'
     POSE = 'geometry_msgs/msg/PoseStamped'
+    IMU = 'sensor_msgs/msg/Imu'
     STRING = 'std_msgs/msg/String'
     DIAGNOSTIC_STATUS = 'diagnostic_msgs/msg/DiagnosticStatus'
     WRENCH = 'geometry_msgs/msg/WrenchStamped'

@@ -57,7 +57,9 @@ def simulated(disc: Disc, log: np.ndarray, speed: float) -> np.ndarray:
         ground=False,
         sample_rate=100.0,
     ).trajectory
-    return np.column_stack([t.t, t.rates])
+    c, s = np.cos(t.spin_angle), np.sin(t.spin_angle)
+    p, q, r = t.rates.T
+    return np.column_stack([t.t, c * p + s * q, c * q - s * p, r])  # axes fixed in the disc
 
 
 def damping_of(log: np.ndarray, disc: Disc, speed: float) -> tuple[float, float]:
@@ -68,3 +70,17 @@ def damping_of(log: np.ndarray, disc: Disc, speed: float) -> tuple[float, float]
     scale = DENSITY * speed * disc.area * disc.diameter**2 / 4.0
     wobble, spin = wobble_decay(log), spin_decay(log)
     return -wobble * disc.inertia_diametral / scale, -spin * disc.inertia_axial / scale
+
+
+def wobble_turns(log: np.ndarray) -> float:
+    """Return how often the wobble turns in the axes of the disc for each turn of the disc.
+
+    The transverse rate as a complex number has its largest component there, over the angle by
+    which the disc has turned.
+    """
+    spin = log[:, 3]
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (spin[1:] + spin[:-1]) * np.diff(log[:, 0]))])
+    transverse = log[:, 1] + 1j * log[:, 2]
+    turns = np.linspace(0.5, 1.5, 1001)  # not 0: the offset of the gyro
+    power = np.abs(np.exp(-1j * np.outer(turns, turned)) @ transverse)
+    return float(turns[np.argmax(power)])

@@ -37,6 +37,12 @@ def _optimise() -> Program:
     return optimise.main
 
 
+def _identify() -> Program:
+    from disc_sim_ros.cli import identify  # noqa: PLC0415
+
+    return identify.main
+
+
 def _demo() -> Program:
     from disc_sim_ros.cli import demo  # noqa: PLC0415
 
@@ -95,6 +101,7 @@ PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
     'fly': (_fly, 'compute one flight: summary, JSON, CSV, plot or bag'),
     'sweep': (_sweep, 'compute grids and random ensembles of flights into one file'),
     'optimise': (_optimise, 'find the launch with the best range, time or accuracy'),
+    'identify': (_identify, 'find the coefficients of a disc from measured throws'),
     'demo': (_demo, 'throw in real time, record and analyse the flight (ROS 2)'),
     'sim_node': (_sim_node, 'run the simulator node (ROS 2)'),
     'recorder_node': (_recorder_node, 'run the recorder node (ROS 2)'),

@@ -134,11 +134,16 @@ def add_air(p: Parser, title: str) -> argparse._ArgumentGroup:
     add_components(group, '--wind', list(MEAN_WIND.values()), ('X', 'Y', 'Z'), text)
     add_quantity(group, '--turbulence', WIND['turbulence'])
     add_quantity(group, '--seed', WIND['gust_seed'], dest='seed')
+    add_density(group)
+    return group
+
+
+def add_density(group: argparse._ActionsContainer) -> None:
+    """Add the flags of density and gravity."""
     add_quantity(group, '--air-density', AIR['air_density'])
     for quantity in (ALTITUDE, TEMPERATURE):
         add_quantity(group, f'--{quantity.name}', quantity, default=argparse.SUPPRESS)
     add_quantity(group, '--gravity', AIR['gravity'])
-    return group
 
 
 def add_duration(group: argparse._ActionsContainer) -> None:
@@ -173,7 +178,7 @@ def thrown(chosen: argparse.Namespace) -> tuple[launch.Launch, flight.Setup]:
         model=chosen.model,
         aero=getattr(chosen, 'aero', None),
         moment_axes=chosen.moment_axes,
-        air=_air(chosen),
+        air=air_of(chosen),
         wind=Wind(
             mean=tuple(paper_from_map(chosen.wind).tolist()),
             turbulence=chosen.turbulence,
@@ -219,7 +224,7 @@ def _thrower_angles(chosen: argparse.Namespace, spin: float) -> dict[str, float]
 _OTHERS = (('launch_angle', 'pitch'), ('hyzer', 'sideslip'), ('nose', 'sideslip'))
 
 
-def _air(chosen: argparse.Namespace) -> Air:
+def air_of(chosen: argparse.Namespace) -> Air:
     """Return the air by its density, or by altitude and temperature."""
     given = [name for name in (ALTITUDE.name, TEMPERATURE.name) if hasattr(chosen, name)]
     if not given:

@@ -69,3 +69,36 @@ def disc_axis(states: FloatArray) -> FloatArray:
         ],
         axis=-1,
     )
+
+
+def difference(a: FloatArray, b: FloatArray) -> tuple[FloatArray, float]:
+    """Return the local coordinates and the change of the spin angle that take state `a` to `b`.
+
+    The axes of `b` may be turned about the disc's axis; its transverse rates and its spin angle
+    are turned back with them, which is the same motion. The inverse of `moved`.
+
+    Args:
+        a: State, shape (14,).
+        b: State, shape (14,).
+
+    Returns:
+        Local coordinates, shape (11,), and the change of the spin angle [rad].
+    """
+    e0, e1, e2, e3 = a[_ATTITUDE] * (1.0, -1.0, -1.0, -1.0)
+    f0, f1, f2, f3 = b[_ATTITUDE]
+    w = e0 * f0 - e1 * f1 - e2 * f2 - e3 * f3
+    x = e0 * f1 + e1 * f0 + e2 * f3 - e3 * f2
+    y = e0 * f2 - e1 * f3 + e2 * f0 + e3 * f1
+    z = e0 * f3 + e1 * f2 - e2 * f1 + e3 * f0
+    half = np.arctan2(z, w)  # half the turn about z, after the tilt
+    c, s = np.cos(half), np.sin(half)
+    tilt_x, tilt_y = x * c - y * s, y * c + x * s
+    sine = float(np.hypot(tilt_x, tilt_y))
+    angle = 2.0 * np.arctan2(sine, np.hypot(w, z))
+    scale = angle / sine if sine > 0.0 else 2.0
+    c, s = np.cos(2.0 * half), np.sin(2.0 * half)
+    p, q = c * b[10] - s * b[11], s * b[10] + c * b[11]
+    delta = np.array(
+        [*(b[0:6] - a[0:6]), scale * tilt_x, scale * tilt_y, p - a[10], q - a[11], b[12] - a[12]]
+    )
+    return delta, float(b[13] + 2.0 * half - a[13])

@@ -84,7 +84,8 @@ def fly_sampled(
         The samples and the ends, which do not depend on `threads`.
 
     Raises:
-        ConfigError: The setup has gusts, which no estimator can know.
+        ConfigError: The setup has gusts, which no estimator can know, times do not ascend, or an
+            array has another shape.
     """
     if setup.wind.turbulence > 0.0:
         raise ConfigError('turbulence', setup.wind.turbulence, 'sampled flights have no gusts: 0')
@@ -96,6 +97,8 @@ def fly_sampled(
     if rows.shape != (n, len(NAMES)):
         raise ConfigError('rows', rows.shape, f'give an array of shape ({n}, {len(NAMES)})')
     grid = Grid(float(step), float(duration), np.ascontiguousarray(times, dtype=float))
+    if (np.diff(grid.times, prepend=0.0) < 0.0).any():
+        raise ConfigError('times', grid.times.tolist(), 'give them ascending from 0')
     out = Samples(
         np.empty((n, len(grid.times), STATE_SIZE)),
         np.empty(n, np.int64),

@@ -43,3 +43,27 @@ def test_the_rate_of_the_attitude_is_that_of_the_equations():
         [-e1 * p - e2 * q, e0 * p - e3 * q, e0 * q + e3 * p, e1 * q - e2 * p]
     )
     np.testing.assert_allclose(change, expected, atol=1e-5)  # second order: 1e-6 of 2.5
+
+
+def test_a_difference_takes_one_state_to_the_other():
+    other = np.array(Launch(pitch=-50.0, roll=60.0, yaw=-100.0, spin=40.0, roll_rate=3.0).state())
+    other[13] = 0.7
+    delta, turn = local.difference(STATE, other)
+    moved = local.moved(STATE, delta)
+    np.testing.assert_allclose(moved[[0, 1, 2, 3, 4, 5, 12]], other[[0, 1, 2, 3, 4, 5, 12]])
+    np.testing.assert_allclose(local.disc_axis(moved), local.disc_axis(other), atol=1e-12)
+    # The same angular velocity over the ground, and the same place of a mark on the rim.
+    for state, angle in ((moved, STATE[13] + turn), (other, other[13])):
+        turned = frames.rotation_matrix(state[np.newaxis, 6:10])[0]
+        say = turned @ state[10:13], turned @ [np.cos(angle), np.sin(angle), 0.0]
+        if state is moved:
+            expected = say
+    np.testing.assert_allclose(say[0], expected[0], atol=1e-12)
+    np.testing.assert_allclose(say[1], expected[1], atol=1e-12)
+
+
+def test_a_difference_is_the_inverse_of_a_move():
+    delta = np.array([1.0, -2.0, 3.0, 0.5, 0.4, 0.3, 0.9, -1.7, 4.0, 5.0, -6.0])
+    back, turn = local.difference(STATE, local.moved(STATE, delta))
+    np.testing.assert_allclose(back, delta, atol=1e-12)
+    assert turn == pytest.approx(0.0, abs=1e-12)

@@ -3,7 +3,15 @@
 import pytest
 
 from disc_sim_ros.physics.disc_file import load_disc
-from gyro_logs import SPEEDS, damping_of, logs, simulated, spin_decay, wobble_decay
+from gyro_logs import (
+    SPEEDS,
+    damping_of,
+    logs,
+    simulated,
+    spin_decay,
+    wobble_decay,
+    wobble_turns,
+)
 from measurements import beside, say
 
 FILE = beside('data/throws/ultrastar_gyro.csv')
@@ -62,3 +70,18 @@ def test_the_printed_damping_kills_a_wobble_too_fast():
     frisbee = load_disc('frisbee_as_printed')
     for log in LOGS.values():
         assert wobble_decay(simulated(frisbee, log, MIDDLE)) > WOBBLES[1]
+
+
+@pytest.mark.parametrize('throw', LOGS)
+def test_the_wobble_of_a_log_turns_faster_than_that_of_a_rigid_disc(throw):
+    """A rigid disc wobbles I_z / I_x - 1 times a turn in its own axes, at most once.
+
+    So no rigid disc fits these logs, and `identify` finds bounds or refuses: docs/identify.md.
+    """
+    ours, turns = (
+        wobble_turns(log) for log in (simulated(DISC, LOGS[throw], MIDDLE), LOGS[throw])
+    )
+    say(f'{throw}: the wobble turns {turns:.2f} times a turn, simulated {ours:.2f} times')
+    expected = DISC.inertia_axial / DISC.inertia_diametral - 1.0
+    assert ours == pytest.approx(expected, abs=0.05)
+    assert 1.0 < turns < 1.35

@@ -153,5 +153,7 @@ def test_gusts_and_wrong_shapes_are_refused():
         fly_sampled(states, rows, gusty, times, step=0.01, duration=1.0)
     with pytest.raises(ConfigError, match=rf'rows.*\(2, {len(NAMES)}\)'):
         fly_sampled(states, rows[:1], setup, times, step=0.01, duration=1.0)
+    with pytest.raises(ConfigError, match=r'times.*ascending'):
+        fly_sampled(states, rows, setup, np.array([0.2, 0.1]), step=0.01, duration=1.0)
     with pytest.raises(ConfigError, match=r'states.*\(n, 14\)'):
         fly_sampled(states[0], rows, setup, times, step=0.01, duration=1.0)

@@ -1,0 +1,307 @@
+"""`identify`: the coefficients of a disc, with standard errors, from measured throws."""
+
+import argparse
+import base64
+from collections.abc import Sequence
+from datetime import UTC, datetime
+import html
+import io
+import json
+from pathlib import Path
+import shlex
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from disc_sim_ros import __version__, files
+from disc_sim_ros.cli import flags, output
+from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
+from disc_sim_ros.cli.main import run_program
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics import disc_file, flight
+from disc_sim_ros.physics.disc import AERODYNAMICS
+from disc_sim_ros.quantities import COEFFICIENTS, IDENTIFICATION, LAUNCH, MEAN_WIND
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from disc_sim_ros.estimation.identification import Identification
+    from disc_sim_ros.estimation.problem import Prior
+    from disc_sim_ros.estimation.throws import Throw
+
+_INSTRUMENTS = ('position', 'attitude', 'gyro', 'acceleration')
+_USED = ('position', 'attitude', 'gyro')  # unless --use says otherwise
+_EVERY = 2.0  # s between two lines of progress
+
+
+def parser(prog: str = 'identify') -> Parser:
+    """Return the command line of `identify`."""
+    p = Parser(
+        prog=prog,
+        description='Find the coefficients of a disc from measured throws: bags with Odometry or '
+        'PoseStamped (and Imu), or CSV files with the columns t_s; x_m, y_m, z_m; qx, qy, qz, qw; '
+        'p_rad_s, q_rad_s, r_rad_s; fx_m_s2, fy_m_s2, fz_m_s2; throw. All throws are of one disc '
+        'in one wind. Coefficients that the throws do not determine keep the value of --disc.',
+        epilog='Exit code 0; 1: a file cannot be written; 2: bad input; 130: Ctrl-C, after the '
+        'best result so far.',
+    )
+    p.set_defaults(prog=prog)
+    p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    p.add_argument(
+        'throws',
+        nargs='+',
+        type=path,
+        metavar='THROWS',
+        help='bags (folders, .mcap) or .csv files',
+    )
+    what = p.add_argument_group('disc')
+    what.add_argument(
+        '--disc',
+        type=path,
+        default=disc_file.DEFAULT_DISC,
+        metavar='NAME|FILE.yaml|NUMBERS',
+        help='disc to start from: its mass, size, I_z and the shape of its curves are kept',
+    )
+    what.add_argument(
+        '--aero',
+        choices=AERODYNAMICS,
+        default=argparse.SUPPRESS,
+        help="steady coefficients to start from (default: the disc's own)",
+    )
+    what.add_argument(
+        '--model', choices=tuple(flight.MODELS), default=flight.Setup.model, help='rigid body'
+    )
+    what.add_argument(
+        '--free',
+        default=argparse.SUPPRESS,
+        metavar='NAME,...',
+        help=f'coefficients to fit, of {", ".join(COEFFICIENTS)} (default: all that the throws '
+        'determine)',
+    )
+    what.add_argument(
+        '--anyway',
+        action='store_true',
+        help='also fit coefficients that the throws do not determine: what is believed of discs '
+        'beforehand then decides',
+    )
+    made = p.add_argument_group('measurements')
+    made.add_argument(
+        '--use',
+        default=argparse.SUPPRESS,
+        metavar='NAME,...',
+        help=f'instruments to use, of {", ".join(_INSTRUMENTS)} (default: {", ".join(_USED)})',
+    )
+    add_quantity(made, '--spin', LAUNCH['spin'], default=argparse.SUPPRESS)
+    for name in ('camera_height', 'accelerometer_range'):
+        add_quantity(
+            made, f'--{name.replace("_", "-")}', IDENTIFICATION[name], default=argparse.SUPPRESS
+        )
+    add_quantity(made, '--camera-error', IDENTIFICATION['camera_error'])
+    text = 'mean wind beforehand, in map axes'
+    add_components(made, '--wind', list(MEAN_WIND.values())[:2], ('X', 'Y'), text)
+    add_quantity(made, '--wind-error', IDENTIFICATION['wind_error'])
+    flags.add_density(made)
+    search = p.add_argument_group('search and output')
+    add_quantity(search, '--starts', IDENTIFICATION['starts'])
+    add_quantity(search, '--seed', IDENTIFICATION['start_seed'], dest='seed')
+    search.add_argument(
+        '--out',
+        type=path,
+        default=argparse.SUPPRESS,
+        metavar='FILE.yaml',
+        help='disc file to write',
+    )
+    search.add_argument(
+        '--report',
+        type=path,
+        default=argparse.SUPPRESS,
+        metavar='DIR',
+        help='new folder for report.html with plots, and its numbers as report.json',
+    )
+    search.add_argument('--json', action='store_true', help='print one JSON document')
+    return p
+
+
+def main(arguments: Sequence[str] | None = None, prog: str = 'identify') -> int:
+    """Run `identify` and return its exit code."""
+    return run_program(parser(prog), _run, arguments, in_flags=flags.in_flags)
+
+
+def _run(chosen: argparse.Namespace) -> int:
+    out, report_folder = getattr(chosen, 'out', None), getattr(chosen, 'report', None)
+    if out is not None:
+        if not disc_file.is_file(out):
+            raise ConfigError('--out', out, 'give a name that ends in .yaml')
+        output.check_writable('--out', out)
+    if report_folder is not None:
+        files.check_new_folder('--report', Path(report_folder))
+    setup = flight.Setup(
+        disc=disc_file.load_disc(chosen.disc),
+        model=chosen.model,
+        aero=getattr(chosen, 'aero', None),
+        air=flags.air_of(chosen),
+    )
+    throws = _throws(chosen, setup)
+    # Imported once the input is known to be right: they take a second.
+    from disc_sim_ros.estimation import crossvalidation, identification, report  # noqa: PLC0415
+    from disc_sim_ros.physics import sampled  # noqa: PLC0415
+
+    if note := sampled.first_call_note():
+        output.note(chosen.prog, note)
+    result = identification.identify(
+        throws,
+        setup,
+        free=_listed(chosen, 'free'),
+        prior=_prior(chosen),
+        anyway=chosen.anyway,
+        starts=chosen.starts,
+        seed=chosen.seed,
+        progress=_Progress(chosen.prog),
+    )
+    misses: list[float | None] = []
+    if not result.interrupted:
+        misses = crossvalidation.left_out_misses(result)
+    if chosen.json:
+        output.show(json.dumps(report.document(result, misses), allow_nan=False))
+    else:
+        output.show(report.text(result, misses))
+    said = []
+    if out is not None:
+        text = report.disc_file(result, Path(out).stem, _provenance(chosen))
+        output.write_whole('--out', out, text.encode())
+        said.append(f'wrote {out}: fly --disc {out}')
+    if report_folder is not None:
+        _write_report(Path(report_folder), result, misses, _provenance(chosen))
+        said.append(f'wrote {Path(report_folder) / "report.html"}')
+    for line in said:
+        if chosen.json:
+            output.note(chosen.prog, line)
+        else:
+            output.show(line)
+    return 130 if result.interrupted else 0
+
+
+class _Progress:
+    """Shows the stage and the cost on stderr, at most every two seconds."""
+
+    def __init__(self, prog: str) -> None:
+        self._prog, self._last = prog, time.monotonic()
+        self._started = self._last
+
+    def __call__(self, stage: str, count: int, cost: float) -> None:
+        """Show a step of a stage."""
+        now = time.monotonic()
+        if now - self._last >= _EVERY:
+            self._last = now
+            tail = f', half squares {cost:.1f}' if cost == cost else ''  # noqa: PLR0124 - not nan
+            output.note(self._prog, f'{now - self._started:.0f} s: {stage}, step {count}{tail}')
+
+
+def _prior(chosen: argparse.Namespace) -> 'Prior':
+    import numpy as np  # noqa: PLC0415
+
+    from disc_sim_ros.estimation.coefficients import NAMES  # noqa: PLC0415
+    from disc_sim_ros.estimation.problem import Prior  # noqa: PLC0415
+    from disc_sim_ros.quantities import COEFFICIENT_SPREAD  # noqa: PLC0415
+
+    return Prior(
+        np.array([COEFFICIENT_SPREAD[name] for name in NAMES]),
+        wind=tuple(chosen.wind),
+        wind_deviation=chosen.wind_error,
+        foot_deviation=chosen.camera_error,
+    )
+
+
+def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
+    from disc_sim_ros.estimation.measured import Instruments, throw_from  # noqa: PLC0415
+
+    instruments = Instruments(
+        gravity=setup.air.gravity,
+        camera_height=getattr(chosen, 'camera_height', None),
+        largest_acceleration=getattr(chosen, 'accelerometer_range', float('inf')),
+        spin=getattr(chosen, 'spin', None),
+    )
+    used = _listed(chosen, 'use') or list(_USED)
+    for name in used:
+        if name not in _INSTRUMENTS:
+            raise ConfigError('--use', name, f'choose from {", ".join(_INSTRUMENTS)}')
+    throws = []
+    for source in chosen.throws:
+        measured = _read(source)
+        for name, columns in measured.items():
+            full = name if len(chosen.throws) == 1 else f'{Path(source).name} {name}'
+            kept = {k: v for k, v in columns.items() if k in {*used, 'camera'}}
+            if not kept:
+                allowed = f'it has {", ".join(columns) or "nothing"}, --use {",".join(used)}'
+                raise ConfigError('throws', full, allowed)
+            throws.append(throw_from(full, kept, setup.disc, instruments))
+    return throws
+
+
+def _read(source: str) -> 'dict[str, dict]':  # type: ignore[type-arg]
+    """Return the measurements of a file or a bag."""
+    if Path(source).suffix.lower() == '.csv':
+        from disc_sim_ros.estimation import throw_csv  # noqa: PLC0415
+
+        return throw_csv.read(source)  # type: ignore[return-value]
+    from disc_sim_ros.analysis import measured_flights  # noqa: PLC0415
+    from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
+    from disc_sim_ros.errors import BagError  # noqa: PLC0415
+
+    try:
+        return measured_flights.measured(open_bag(source))
+    except BagError as error:
+        raise ConfigError('throws', source, str(error).removeprefix(f'{source}: ')) from None
+
+
+def _listed(chosen: argparse.Namespace, name: str) -> list[str] | None:
+    """Return the words of a flag that takes several, or None."""
+    text = getattr(chosen, name, None)
+    return None if text is None else [word.strip() for word in text.split(',') if word.strip()]
+
+
+def _provenance(chosen: argparse.Namespace) -> list[str]:
+    """Return what made a result: version, date, command."""
+    day = datetime.now(UTC).strftime('%Y-%m-%d')
+    words = sys.argv[1:] if Path(sys.argv[0]).stem == chosen.prog else chosen.throws
+    return [
+        f'Identified by disc_sim_ros {__version__} on {day} from {len(chosen.throws)} files:',
+        *(f'  {source}' for source in chosen.throws),
+        f'Command: {chosen.prog} {shlex.join(words)}',
+    ]
+
+
+def _write_report(
+    folder: Path, result: 'Identification', misses: Sequence[float | None], lines: Sequence[str]
+) -> None:
+    from disc_sim_ros.estimation import plots, report  # noqa: PLC0415
+
+    figures = [plots.paths(result), plots.residuals(result), plots.correlations(result)]
+    text = report.text(result, misses)
+    document = json.dumps(report.document(result, misses), allow_nan=False, indent=1)
+    pictures = '\n'.join(_picture(figure) for figure in figures if figure is not None)
+    escaped = html.escape('\n'.join([*lines, '', text]))
+    page = (
+        '<!doctype html><html lang="en"><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        '<title>Identification of a disc</title>'
+        '<style>body{font:16px sans-serif;max-width:60em;margin:1em auto;padding:0 1em}'
+        'img{max-width:100%;background:#fff}pre{overflow-x:auto}'
+        ':root{color-scheme:light dark}</style>'
+        f'<h1>Identification of a disc</h1><pre>{escaped}</pre>{pictures}</html>'
+    )
+    with files.whole_folder('--report', folder) as made:
+        made.mkdir()
+        (made / 'report.html').write_text(page, encoding='utf-8')
+        (made / 'report.json').write_text(document, encoding='utf-8')
+
+
+def _picture(figure: 'Figure') -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format='png', dpi=110)
+    data = base64.b64encode(buffer.getvalue()).decode()
+    return f'<p><img alt="plot" src="data:image/png;base64,{data}"></p>'
+
+
+if __name__ == '__main__':
+    sys.exit(main())

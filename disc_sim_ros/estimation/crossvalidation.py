@@ -1,0 +1,79 @@
+"""How well the disc of other throws predicts one: leave-one-throw-out."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.fitting import solve
+from disc_sim_ros.estimation.identification import Identification
+from disc_sim_ros.estimation.observations import Camera, Observation, Positions
+from disc_sim_ros.estimation.problem import Prior, Problem
+from disc_sim_ros.estimation.throws import Throw
+
+_WATCHED = 0.3  # share of a throw from which its release is fitted
+_FEWEST = 6  # samples in it
+_KNOWN = 1e-3  # deviation of a wind that other throws told [m/s]
+
+
+def left_out_misses(result: Identification) -> list[float | None]:
+    """Return by how much each throw is missed by a fit of the others [m].
+
+    Coefficients and wind are those of the other throws. The release of the throw is fitted to the
+    first 30 % of its samples; the miss is the horizontal distance of its last point.
+
+    Args:
+        result: The identification with all throws.
+
+    Returns:
+        A miss for each throw; None for one without positions, and for a throw that is alone.
+    """
+    problem = result.problem
+    n = len(problem.throws)
+    if n < 2:
+        return [None]
+    return [_miss(problem, result.x, k) for k in range(n)]
+
+
+def _miss(problem: Problem, x: FloatArray, k: int) -> float | None:
+    throw = problem.throws[k]
+    path = next((o for o in throw.observations if isinstance(o, Positions | Camera)), None)
+    if path is None or len(path.t) * _WATCHED < _FEWEST:
+        return None
+    rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
+    shared = solve(rest, np.delete(x, np.r_[problem.own(k)])).x[: problem.shared]
+    free = len(problem.free)
+    held = problem.held.copy()
+    held[list(problem.free)] = shared[:free]
+    foot = tuple(float(v) for v in shared[free + 2 : free + 4]) or problem.prior.foot
+    prior = Prior(
+        problem.prior.coefficients,
+        wind=(float(shared[free]), float(shared[free + 1])),
+        wind_deviation=_KNOWN,
+        foot=(foot[0], foot[1]),
+        foot_deviation=_KNOWN,
+    )
+    end = float(path.t[-1]) * _WATCHED
+    watched = replace(throw, observations=tuple(_until(o, end) for o in throw.observations))
+    begun = replace(problem, throws=(watched,), free=(), held=held, prior=prior)
+    release = solve(begun, np.concatenate([begun.means[: begun.shared], x[problem.own(k)]])).x
+    whole = replace(begun, throws=(throw,))
+    parts = whole.predictions(0, release[np.newaxis])
+    place = throw.observations.index(path)
+    return float(np.linalg.norm(parts[place][0, -1, :2]))
+
+
+def _until(o: Observation, end: float) -> Observation:
+    """Return the measurements up to a time, at least some."""
+    n = max(int(np.searchsorted(o.t, end, side='right')), _FEWEST)
+    values = {
+        name: value[:n]
+        for name, value in vars(o).items()
+        if isinstance(value, np.ndarray) and len(value) == len(o.t)
+    }
+    return replace(o, **values)  # type: ignore[type-var]
+
+
+def watched(throw: Throw, seconds: float) -> Throw:
+    """Return a throw as seen up to a time."""
+    return replace(throw, observations=tuple(_until(o, seconds) for o in throw.observations))

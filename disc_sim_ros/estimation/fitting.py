@@ -1,0 +1,352 @@
+"""Solve the least-squares problem: starts, robust loss, and the best parameters so far."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+import itertools
+import math
+import os
+from typing import TypeVar
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation import local
+from disc_sim_ros.estimation.observations import ATTITUDE, GYRO
+from disc_sim_ros.estimation.problem import ROUGH, Problem
+from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw, tilted
+
+_CORNER = 2.5  # standard deviations at which the loss of a residual turns from square to straight
+_SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
+_MOST_TRIES = 8  # of a step with more and more damping
+_KEPT = 3  # starts that are fitted, of those that are tried
+_FIRST_STEPS = 8
+# Attitudes about the path to start from: angle of attack and roll [degrees].
+_ATTACKS, _ROLLS = (-5.0, 5.0, 15.0), (-40.0, -20.0, 0.0, 20.0, 40.0)
+_SPIN_ANGLES = 12
+_SPINS, _SPIN_STEP = (
+    10,
+    0.4,
+)  # neighbours of a fitted spin rate, each way, and their distance [rad/s]
+BETTER = 0.5  # decrease of the cost for which a release is exchanged
+
+_T = TypeVar('_T')
+Progress = Callable[[str, int, float], None]
+
+
+@dataclass
+class Best:
+    """The best parameters so far, kept while a search goes on, so that Ctrl-C loses nothing."""
+
+    x: FloatArray = field(default_factory=lambda: np.empty(0))
+    cost: float = math.inf
+
+    def offer(self, x: FloatArray, cost: float) -> None:
+        """Keep parameters if they are better."""
+        if cost < self.cost:
+            self.x, self.cost = x.copy(), cost
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The end of a search.
+
+    Attributes:
+        x: The parameters, shape (p,).
+        cost: Half the robust sum of squares.
+        steps: Number of steps.
+    """
+
+    x: FloatArray
+    cost: float
+    steps: int
+
+
+def robust_loss(residuals: FloatArray) -> FloatArray:
+    """Return half the loss of each residual: its square, and beyond the corner straight on."""
+    loss: FloatArray = _CORNER**2 * (np.sqrt(1.0 + residuals**2 / _CORNER**2) - 1.0)
+    return loss
+
+
+def weights(residuals: FloatArray) -> FloatArray:
+    """Return the weight of each residual in the robust loss, 1 for a small one."""
+    weight: FloatArray = 1.0 / np.sqrt(1.0 + residuals**2 / _CORNER**2)
+    return weight
+
+
+def cost_of_throw(problem: Problem, k: int, here: FloatArray) -> float:
+    """Return half the robust sum of squares of throw `k` with the prior of its release."""
+    prior = problem.release_priors(k, here[problem.shared :])
+    return float(robust_loss(problem.residuals(k, here)).sum() + 0.5 * (prior**2).sum())
+
+
+def _each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
+    """Return the results for all throws, computed side by side."""
+    n = len(problem.throws)
+    if n == 1:
+        return [work(0)]
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, n)) as pool:
+        return list(pool.map(work, range(n)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """The normal equations of one throw."""
+
+    shared: FloatArray  # of the shared parameters, shape (s, s)
+    mixed: FloatArray  # shape (s, 12)
+    own: FloatArray  # of the release, with its prior, shape (12, 12)
+    gradient: FloatArray  # by the shared parameters, shape (s,)
+    own_gradient: FloatArray  # by the release, shape (12,)
+
+
+def _block(problem: Problem, k: int, x: FloatArray) -> _Block:
+    here = problem.here(k, x)
+    r, slopes = problem.linearised(k, here)
+    weighted = weights(r)[:, np.newaxis] * slopes
+    normal, gradient = slopes.T @ weighted, weighted.T @ r
+    n, root = problem.shared, problem.throws[k].information
+    prior = problem.release_priors(k, here[n:])
+    return _Block(
+        normal[:n, :n],
+        normal[:n, n:],
+        normal[n:, n:] + root.T @ root,
+        gradient[:n],
+        gradient[n:] + root.T @ prior,
+    )
+
+
+def fit_release(
+    problem: Problem, k: int, here: FloatArray, most_steps: int = 8
+) -> tuple[FloatArray, float]:
+    """Fit the release of throw `k` for given shared parameters.
+
+    Args:
+        problem: The problem.
+        k: Number of the throw.
+        here: The shared parameters and a first release, shape (shared + 12,).
+        most_steps: Gauss-Newton steps after which to end.
+
+    Returns:
+        The same with the fitted release, and the cost of the throw.
+    """
+    n, root = problem.shared, problem.throws[k].information
+    cost = cost_of_throw(problem, k, here)
+    damping = 1e-4
+    for _ in range(most_steps):
+        r, slopes = problem.linearised(k, here, release_only=True)
+        weighted = weights(r)[:, np.newaxis] * slopes
+        normal = slopes.T @ weighted + root.T @ root
+        gradient = weighted.T @ r + root.T @ problem.release_priors(k, here[n:])
+        before = cost
+        for _ in range(_MOST_TRIES):
+            step = _solved(normal, -gradient, damping)
+            tried = here.copy()
+            tried[n:] += step
+            tried_cost = cost_of_throw(problem, k, tried)
+            if tried_cost < cost:
+                here, cost, damping = tried, tried_cost, damping * 0.1
+                break
+            damping = max(damping * 10.0, 1e-6)
+        if before - cost < _SMALL:
+            break
+    return here, cost
+
+
+def solve(
+    problem: Problem,
+    x0: FloatArray,
+    *,
+    most_steps: int = 40,
+    best: Best | None = None,
+    progress: Progress | None = None,
+    stage: str = '',
+) -> Solution:
+    """Minimise the robust sum of squares from `x0`.
+
+    Gauss-Newton with damping on the shared parameters alone: for each set of them that is tried,
+    all releases are fitted anew (variable projection). A search over all parameters at once has to
+    follow a narrow curved valley, in which scipy's trust region ended too early in 3 of 4 trials.
+
+    Args:
+        problem: The problem.
+        x0: First parameters, shape (p,).
+        most_steps: After which the search ends.
+        best: Updated with each better point.
+        progress: Called with the stage, the step and the cost.
+        stage: For `progress`.
+    """
+    keeper = Best() if best is None else best
+    n = problem.shared
+    low, high = problem.bounds
+    x = x0.copy()
+    x[:n] = np.clip(x[:n], low, high)
+    x, cost = _released(problem, x)
+    damping = 1e-3
+    count = 0
+    for count in range(1, most_steps + 1):
+        keeper.offer(x, cost)
+        if progress is not None:
+            progress(stage, count, cost)
+        blocks = _each(problem, lambda k, x=x: _block(problem, k, x))  # type: ignore[misc]
+        inverses = [np.linalg.inv(b.own) for b in blocks]
+        prior = problem.shared_priors(x[:n]) / problem.shared_deviations
+        normal = np.diag(1.0 / problem.shared_deviations**2)
+        gradient = prior.copy()
+        for b, inverse in zip(blocks, inverses, strict=True):
+            normal = normal + b.shared - b.mixed @ inverse @ b.mixed.T
+            gradient = gradient + b.gradient - b.mixed @ (inverse @ b.own_gradient)
+        before = cost
+        for _ in range(_MOST_TRIES):
+            step = _within(x[:n], normal, gradient, damping, (low, high))
+            tried = x.copy()
+            tried[:n] += step
+            for k, (b, inverse) in enumerate(zip(blocks, inverses, strict=True)):
+                tried[problem.own(k)] -= inverse @ (b.own_gradient + b.mixed.T @ step)
+            tried, tried_cost = _released(problem, tried)
+            if tried_cost < cost:
+                x, cost, damping = tried, tried_cost, damping * 0.1
+                break
+            damping = max(damping * 10.0, 1e-6)
+        if before - cost < _SMALL:
+            break
+    keeper.offer(x, cost)
+    return Solution(x, cost, count)
+
+
+def _released(problem: Problem, x: FloatArray) -> tuple[FloatArray, float]:
+    """Return the parameters with all releases fitted, and the cost."""
+    n = problem.shared
+    fitted = _each(problem, lambda k: fit_release(problem, k, problem.here(k, x)))
+    x = x.copy()
+    for k, (here, _) in enumerate(fitted):
+        x[problem.own(k)] = here[n:]
+    prior = problem.shared_priors(x[:n])
+    return x, float(sum(cost for _, cost in fitted) + 0.5 * (prior**2).sum())
+
+
+def _within(
+    x: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+    damping: float,
+    bounds: tuple[FloatArray, FloatArray],
+) -> FloatArray:
+    """Return a step that stays in the bounds; a parameter at one does not move outwards."""
+    low, high = bounds
+    free = ~(((x <= low) & (gradient > 0.0)) | ((x >= high) & (gradient < 0.0)))
+    step = np.zeros_like(x)
+    step[free] = _solved(normal[np.ix_(free, free)], -gradient[free], damping)
+    return np.clip(x + step, low, high) - x
+
+
+def _solved(normal: FloatArray, right: FloatArray, damping: float) -> FloatArray:
+    """Return the damped Gauss-Newton step, in parameters of any units."""
+    scale = 1.0 / np.sqrt(np.diag(normal))
+    scaled = normal * np.outer(scale, scale)
+    step: FloatArray = scale * np.linalg.solve(
+        scaled + damping * np.eye(len(scale)), scale * right
+    )
+    return step
+
+
+def fitted_start(problem: Problem, k: int) -> tuple[Throw, FloatArray]:
+    """Fit throw `k` alone from many starts.
+
+    Returns:
+        The throw with changes counted from the best first state, and the shared parameters there.
+    """
+    throw = problem.throws[k]
+    alone = replace(problem, throws=(throw,), margin=ROUGH)
+    fitted: list[tuple[float, int, Problem, FloatArray]] = []
+    for state in _promising(alone, 0, alone.means, starts(throw)):
+        around = replace(alone, throws=(throw.starting_at(state),))
+        solution = solve(around, around.means, most_steps=_FIRST_STEPS)
+        fitted.append((solution.cost, len(fitted), around, solution.x))
+    _, _, around, x = min(fitted, key=lambda entry: entry[:2])
+    states, _, _ = around.states_and_rows(0, x[np.newaxis])
+    return throw.starting_at(states[0]), x[: problem.shared]
+
+
+def retry_releases(
+    problem: Problem, x: FloatArray, which: Sequence[int]
+) -> tuple[Problem, FloatArray, bool]:
+    """Fit releases again from many starts, with the shared parameters known better by now.
+
+    A release has many local minima: the spin rate determines how often the disc wobbles until its
+    landing, and each more or less of those is one.
+
+    Returns:
+        The problem with changes counted from the best first states, the parameters there, and
+        whether one of them is better than before.
+    """
+
+    def retried(k: int) -> tuple[Throw, FloatArray, bool]:
+        throw, here = problem.throws[k], problem.here(k, x)
+        if k not in which:
+            return throw, here, False
+        cost = cost_of_throw(problem, k, here)
+        states, _, _ = problem.states_and_rows(k, here[np.newaxis])
+        best = (throw, here, False)
+        for state in _promising(problem, k, here, starts(throw) + _neighbours(states[0])):
+            around = throw.starting_at(state)
+            alone = replace(problem, throws=(around,))
+            first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
+            fitted, fitted_cost = fit_release(alone, 0, first)
+            if fitted_cost < cost - BETTER:
+                best, cost = (around, fitted, True), fitted_cost
+        return best
+
+    results = _each(problem, retried)
+    problem = replace(problem, throws=tuple(throw for throw, _, _ in results))
+    x = x.copy()
+    for k, (_, here, _) in enumerate(results):
+        x[problem.own(k)] = here[problem.shared :]
+    return problem, x, any(better for _, _, better in results)
+
+
+def _promising(
+    problem: Problem, k: int, here: FloatArray, candidates: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Return the first states of throw `k` that fit best as they are, the best first."""
+    tried = np.tile(here, (len(candidates), 1))
+    for row, state in zip(tried, candidates, strict=True):
+        delta, turn = local.difference(problem.throws[k].start, state)
+        row[problem.shared :] = [*delta, turn]
+    losses = robust_loss(problem.whitened(k, tried)).sum(axis=1)
+    return [candidates[i] for i in np.argsort(losses, kind='stable')[:_KEPT]]
+
+
+def _neighbours(state: FloatArray) -> list[FloatArray]:
+    """Return states with other spin rates, without wobble and with what there is of it."""
+    results = []
+    for number in range(-_SPINS, _SPINS + 1):
+        for share in (0.0, 1.0):
+            other = state.copy()
+            other[12] += _SPIN_STEP * number
+            other[10:12] *= share
+            results.append(other)
+    return results
+
+
+def starts(throw: Throw) -> list[FloatArray]:
+    """Return first states to start from: attitudes, senses of the spin and spin angles."""
+    attitudes = [throw.start[6:10]]
+    if not throw.has(ATTITUDE):
+        velocity = throw.start[3:6]
+        attitudes += [
+            tilted(velocity, math.radians(attack), math.radians(roll))
+            for attack, roll in itertools.product(_ATTACKS, _ROLLS)
+        ]
+    signs = (1.0,) if throw.spin_known else (1.0, -1.0)
+    angles = np.arange(_SPIN_ANGLES) * 2.0 * math.pi / _SPIN_ANGLES if throw.has(GYRO) else [0.0]
+    result = []
+    for attitude, sign, angle in itertools.product(attitudes, signs, angles):
+        state = throw.start.copy()
+        state[6:10] = attitude
+        state[12] *= sign
+        c, s = math.cos(angle), math.sin(angle)
+        p, q = state[10], state[11]
+        state[10], state[11], state[13] = c * p - s * q, s * p + c * q, angle
+        result.append(state)
+    return result

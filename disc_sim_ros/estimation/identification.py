@@ -1,0 +1,335 @@
+"""From measured throws to the coefficients of a disc with standard errors: `identify`."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+import os
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation import coefficients, information
+from disc_sim_ros.estimation.coefficients import NAMES, Base, base_of
+from disc_sim_ros.estimation.fitting import (
+    BETTER,
+    Best,
+    Progress,
+    Solution,
+    fitted_start,
+    retry_releases,
+    solve,
+)
+from disc_sim_ros.estimation.information import Unidentifiable
+from disc_sim_ros.estimation.observations import NOISE, UNITS
+from disc_sim_ros.estimation.problem import ROUGH, Prior, Problem
+from disc_sim_ros.estimation.throws import Throw
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.quantities import COEFFICIENT_SPREAD
+
+_SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
+_NORMAL = 1.4826  # standard deviation over median of the absolute values, of normal numbers
+_WORST_FIT = 30.0  # times the usual noise of an instrument: beyond, it is no flight of such a disc
+_START_SPREAD = 0.5  # of the prior: how far other starts lie
+_START_STEPS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The result of `identify`.
+
+    Attributes:
+        problem: The least-squares problem that was solved last.
+        x: Its parameters, shape (p,).
+        covariance: Of the parameters, shape (p, p).
+        widening: Factor that the standard errors contain because residuals are correlated in time.
+        left_out: Coefficients that kept the value of the base disc, with the reasons.
+        interrupted: Whether Ctrl-C ended the search: the best parameters so far.
+        seed: Of the starts.
+    """
+
+    problem: Problem
+    x: FloatArray
+    covariance: FloatArray
+    widening: float
+    left_out: tuple[Unidentifiable, ...]
+    interrupted: bool
+    seed: int
+
+    @property
+    def base(self) -> Base:
+        """Return the base disc."""
+        return self.problem.base
+
+    @property
+    def values(self) -> FloatArray:
+        """Return all coefficients in the order of `coefficients.NAMES`, shape (9,)."""
+        values = self.problem.held.copy()
+        values[list(self.problem.free)] = self.x[: len(self.problem.free)]
+        return values
+
+    @property
+    def errors(self) -> FloatArray:
+        """Return the standard errors of all coefficients, nan where held, shape (9,)."""
+        errors = np.full(len(NAMES), np.nan)
+        n = len(self.problem.free)
+        errors[list(self.problem.free)] = np.sqrt(np.diag(self.covariance))[:n]
+        return errors
+
+    @property
+    def shared_errors(self) -> FloatArray:
+        """Return the standard errors of the shared parameters, in the order of `problem.names`."""
+        errors: FloatArray = np.sqrt(np.diag(self.covariance))[: self.problem.shared]
+        return errors
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Return the correlations of the shared parameters, shape (k, k)."""
+        n = self.problem.shared
+        errors = self.shared_errors
+        correlation: FloatArray = self.covariance[:n, :n] / np.outer(errors, errors)
+        return correlation
+
+    @property
+    def wind(self) -> FloatArray:
+        """Return the wind of the session, x and y in `map` [m/s], shape (2,)."""
+        n = len(self.problem.free)
+        return self.x[n : n + 2]
+
+    def parameters_of(self, k: int) -> FloatArray:
+        """Return the shared parameters and the release of throw `k`, shape (1, shared + 12)."""
+        return self.problem.here(k, self.x)[np.newaxis]
+
+    def residuals(self, k: int) -> dict[str, FloatArray]:
+        """Return predictions minus measurements of throw `k` by instrument, each (n, d)."""
+        parts = self.problem.predictions(k, self.parameters_of(k))
+        throw = self.problem.throws[k]
+        return {o.kind: r[0] for o, r in zip(throw.observations, parts, strict=True)}
+
+    def rms(self, kind: str) -> float:
+        """Return the root mean square of the residuals of an instrument over all throws."""
+        every = [self.residuals(k).get(kind) for k in range(len(self.problem.throws))]
+        flat = np.concatenate([r.ravel() for r in every if r is not None])
+        return float(np.sqrt((flat**2).mean()))
+
+
+def identify(
+    throws: Sequence[Throw],
+    setup: Setup,
+    *,
+    free: Sequence[str] | None = None,
+    prior: Prior | None = None,
+    noise: Mapping[str, float] | None = None,
+    anyway: bool = False,
+    starts: int = 2,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Identification:
+    """Fit the coefficients of a disc to measured throws.
+
+    Output-error least squares: the equations of motion fly each throw from a fitted release, and
+    all measurements of all throws are compared at once, with a robust loss. Releases and the wind,
+    which all throws share, are fitted too.
+
+    Args:
+        throws: The throws, of one disc and one session.
+        setup: The base disc, the model and the air; its wind is not used.
+        free: Names of the coefficients to fit, of `coefficients.NAMES`; None for all that the
+            throws determine.
+        prior: What is believed beforehand; None for the spread of discs of one kind.
+        noise: Standard deviations of the instruments, by kind; others are estimated.
+        anyway: Also fit coefficients that the throws do not determine; their priors decide.
+        starts: Number of sets of coefficients to start from.
+        seed: Of those starts; the same seed gives the same answer.
+        progress: Called with a stage, a count and the cost.
+
+    Raises:
+        ConfigError: A name is unknown, the throws do not determine a coefficient of `free`, or no
+            disc like the base disc flies so.
+    """
+    if not throws:
+        raise ConfigError('throws', 0, 'give at least one throw')
+    base = base_of(setup)
+    spread = np.array([COEFFICIENT_SPREAD[name] for name in NAMES])
+    chosen = range(len(NAMES)) if free is None else coefficients.chosen(free)
+    problem = Problem(
+        setup=setup,
+        base=base,
+        free=tuple(chosen),
+        throws=tuple(throws),
+        prior=prior or Prior(spread),
+        noise=NOISE | dict(noise or {}),
+        held=base.values,
+    )
+    best = Best()
+    interrupted = False
+    left_out: list[Unidentifiable] = []
+    try:
+        problem, x = _started(problem, progress)
+        best = Best(x)
+        rough = replace(problem, margin=ROUGH)
+        x = _from_starts(rough, x, _Search(starts, seed, best, progress)).x
+        problem, x, left_out = _identifiable(problem, x, refuse=free is not None, anyway=anyway)
+        best = Best(x)
+        solution = solve(problem, x, best=best, progress=progress, stage='fit')
+        problem, x = _without_each(problem, solution, progress)
+        best = Best(x)
+        given = set(noise or {})
+        for _ in range(2):
+            estimated = _noise(problem, x, given)
+            changed = max(abs(estimated[kind] / problem.noise[kind] - 1.0) for kind in estimated)
+            _refuse_misfit(problem, estimated, given)
+            if changed < _SAME_NOISE:
+                break
+            problem = replace(problem, noise={**problem.noise, **estimated})
+            best = Best(x)
+            x = solve(problem, x, best=best, progress=progress, stage='noise').x
+    except KeyboardInterrupt:
+        if not best.x.size or best.x.size != problem.size:
+            raise
+        interrupted, x = True, best.x
+    known = information.information(problem, x)
+    return Identification(
+        problem, x, known.covariance(), known.widening, tuple(left_out), interrupted, seed
+    )
+
+
+def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, FloatArray]:
+    """Return the problem around the best start of each throw, and first parameters."""
+    done = 0
+
+    def start(k: int) -> tuple[Throw, FloatArray]:
+        nonlocal done
+        result = fitted_start(problem, k)
+        done += 1
+        if progress is not None:
+            progress('releases', done, float('nan'))
+        return result
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(problem.throws))) as pool:
+        fitted = list(pool.map(start, range(len(problem.throws))))
+    problem = replace(problem, throws=tuple(throw for throw, _ in fitted))
+    x = problem.means.copy()
+    x[: problem.shared] = np.median([shared for _, shared in fitted], axis=0)
+    return problem, x
+
+
+@dataclass(frozen=True)
+class _Search:
+    """How to search from several sets of coefficients."""
+
+    starts: int
+    seed: int
+    best: Best
+    progress: Progress | None
+
+
+def _from_starts(problem: Problem, x: FloatArray, search: _Search) -> Solution:
+    """Return the best solution from several sets of coefficients."""
+    generator = np.random.default_rng(search.seed)
+    n = len(problem.free)
+    solutions = []
+    for number in range(search.starts):
+        start = x.copy()
+        if number:
+            step = _START_SPREAD * problem.shared_deviations[:n]
+            start[:n] = problem.means[:n] + step * generator.standard_normal(n)
+        solutions.append(
+            solve(
+                problem,
+                start,
+                most_steps=_START_STEPS,
+                best=search.best,
+                progress=search.progress,
+                stage=f'start {number + 1} of {search.starts}',
+            )
+        )
+    return min(solutions, key=lambda solution: solution.cost)
+
+
+def _without_each(
+    problem: Problem, solution: Solution, progress: Progress | None
+) -> tuple[Problem, FloatArray]:
+    """Look for a better minimum: fit without each throw in turn, then its release anew.
+
+    A throw whose release is fitted in a wrong local minimum bends the coefficients, and those keep
+    it there. Without it the coefficients are right, and the release is found.
+    """
+    n = len(problem.throws)
+    x, cost = solution.x, solution.cost
+    for k in range(n if n > 1 else 0):
+        rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
+        stage = f'without throw {k + 1} of {n}'
+        shared = solve(
+            replace(rest, margin=ROUGH),
+            np.delete(x, np.r_[problem.own(k)]),
+            most_steps=_START_STEPS,
+            progress=progress,
+            stage=stage,
+        ).x[: problem.shared]
+        tried = x.copy()
+        tried[: problem.shared] = shared
+        other, tried, _ = retry_releases(problem, tried, (k,))
+        again = solve(other, tried, most_steps=_START_STEPS, progress=progress, stage=stage)
+        if again.cost < cost - BETTER:
+            problem, x, cost = other, again.x, again.cost
+    return problem, x
+
+
+def _identifiable(
+    problem: Problem, x: FloatArray, *, refuse: bool, anyway: bool
+) -> tuple[Problem, FloatArray, list[Unidentifiable]]:
+    """Leave out, one by one, the coefficients that the throws do not determine, or refuse them.
+
+    Raises:
+        ConfigError: `refuse`, and there is such a coefficient.
+    """
+    left_out: list[Unidentifiable] = []
+    while not anyway and problem.free:
+        open_ones = information.unidentifiable(problem, information.information(problem, x))
+        if not open_ones:
+            break
+        worst = open_ones[0]
+        if refuse:
+            raise ConfigError(
+                'free', worst.name, f'{worst.reason}: leave it out, or give --anyway', 'free'
+            )
+        left_out.append(worst)
+        place = [NAMES[i] for i in problem.free].index(worst.name)
+        problem = replace(problem, free=information.without(problem, [worst.name]))
+        x = np.delete(x, place)
+    if not problem.free and left_out:
+        raise ConfigError('throws', len(problem.throws), f'{left_out[0].reason}; nothing to fit')
+    return problem, x, left_out
+
+
+def _noise(problem: Problem, x: FloatArray, given: set[str]) -> dict[str, float]:
+    """Return the noise of each instrument whose noise was not given, from the residuals."""
+    by_kind: dict[str, list[FloatArray]] = {}
+    for k, throw in enumerate(problem.throws):
+        here = problem.here(k, x)[np.newaxis]
+        for o, r in zip(throw.observations, problem.predictions(k, here), strict=True):
+            by_kind.setdefault(o.kind, []).append(r.ravel())
+    return {
+        kind: problem.noise[kind]
+        if kind in given
+        else max(_NORMAL * float(np.median(np.abs(np.concatenate(r)))), 1e-9)
+        for kind, r in by_kind.items()
+    }
+
+
+def _refuse_misfit(problem: Problem, estimated: Mapping[str, float], given: set[str]) -> None:
+    """Refuse measurements that no disc like the base disc gives.
+
+    Raises:
+        ConfigError: The residuals are far larger than the noise of any such instrument.
+    """
+    for kind, sigma in estimated.items():
+        if kind not in given and sigma > _WORST_FIT * NOISE[kind]:
+            raise ConfigError(
+                kind,
+                f'{sigma:.3g} {UNITS[kind]}',
+                f'the best fit of a disc like {problem.base.disc.name} leaves this residual; more '
+                f'than {_WORST_FIT * NOISE[kind]:.3g} {UNITS[kind]} is another disc, another unit '
+                'or no flight of a disc',
+            )

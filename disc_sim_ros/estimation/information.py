@@ -1,0 +1,138 @@
+"""What measurements tell: the information matrix, standard errors, and what they leave open."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.coefficients import NAMES
+from disc_sim_ros.estimation.fitting import weights
+from disc_sim_ros.estimation.problem import Problem
+
+_CORRELATED = 0.3  # of neighbouring residuals, from which on standard errors are widened
+
+
+@dataclass(frozen=True)
+class Unidentifiable:
+    """A coefficient that the throws do not determine.
+
+    Attributes:
+        name: The coefficient.
+        error: Its standard error from the measurements alone.
+        spread: By how much discs of one kind differ, one standard deviation.
+        partner: The coefficient with which it is most correlated; empty if it is the only one.
+        correlation: With the partner.
+    """
+
+    name: str
+    error: float
+    spread: float
+    partner: str
+    correlation: float
+
+    @property
+    def reason(self) -> str:
+        """Return the reason in words."""
+        text = (
+            f'these throws tell {self.name} to {self.error:.2g}, discs differ by {self.spread:g}'
+        )
+        if self.partner and abs(self.correlation) > 0.9:
+            text += (
+                f'; a change of {self.partner} looks alike (correlation {self.correlation:.2f})'
+            )
+        return text
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Inverse covariances of all parameters at one point.
+
+    Attributes:
+        data: Of the measurements, with robust weights, shape (p, p).
+        priors: Of what was believed before, shape (p, p).
+        widening: Factor on standard errors because residuals are correlated in time, 1 if not.
+    """
+
+    data: FloatArray
+    priors: FloatArray
+    widening: float
+
+    def covariance(self) -> FloatArray:
+        """Return the covariance of the parameters, shape (p, p)."""
+        return _inverse(self.data / self.widening**2 + self.priors)
+
+
+def information(problem: Problem, x: FloatArray) -> Information:
+    """Return the information at the parameters `x`."""
+    n = problem.shared
+    data, priors = np.zeros((problem.size, problem.size)), np.zeros((problem.size, problem.size))
+    priors[:n, :n] = np.diag(1.0 / problem.shared_deviations**2)
+    for k, throw in enumerate(problem.throws):
+        r, slopes = problem.linearised(k, problem.here(k, x))
+        places = np.r_[0:n, problem.own(k)]
+        data[np.ix_(places, places)] += slopes.T @ (weights(r)[:, np.newaxis] * slopes)
+        priors[problem.own(k), problem.own(k)] = throw.information.T @ throw.information
+    return Information(data, priors, _widening(problem, x))
+
+
+def _widening(problem: Problem, x: FloatArray) -> float:
+    """Return the factor by which correlated residuals widen standard errors.
+
+    Residuals with a correlation rho between neighbours tell as much as (1 - rho) / (1 + rho) of
+    their number that are independent (first-order autoregression).
+    """
+    products = squares = 0.0
+    for k in range(len(problem.throws)):
+        here = problem.here(k, x)[np.newaxis]
+        throw = problem.throws[k]
+        for o, r in zip(throw.observations, problem.predictions(k, here), strict=True):
+            whitened = np.clip(r[0] / problem.noise[o.kind], -3.0, 3.0)
+            products += float((whitened[1:] * whitened[:-1]).sum())
+            squares += float((whitened[1:] ** 2).sum())
+    rho = min(products / squares, 0.99) if squares > 0.0 else 0.0
+    return float(np.sqrt((1.0 + rho) / (1.0 - rho))) if rho > _CORRELATED else 1.0
+
+
+def unidentifiable(problem: Problem, known: Information) -> list[Unidentifiable]:
+    """Return the free coefficients that the prior tells better than the measurements, worst first.
+
+    What is believed of releases, wind and camera counts as measured, of coefficients it does not.
+    """
+    n = len(problem.free)
+    priors = known.priors.copy()
+    priors[:n, :n] = 0.0
+    total = known.data / known.widening**2 + priors
+    spread = problem.prior.coefficients[list(problem.free)]
+    total[:n, :n] += np.diag(1e-6 / spread**2)  # for what nothing tells at all
+    covariance = _inverse(total)[:n, :n]
+    errors = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(errors, errors)
+    open_ones = []
+    for i in np.argsort(-errors / spread, kind='stable'):
+        if errors[i] > spread[i]:
+            others = np.abs(correlation[i]) - np.eye(n)[i]
+            j = int(np.argmax(others))
+            partner = NAMES[problem.free[j]] if n > 1 else ''
+            open_ones.append(
+                Unidentifiable(
+                    NAMES[problem.free[int(i)]],
+                    float(errors[i]),
+                    float(spread[i]),
+                    partner,
+                    float(correlation[i, j]),
+                )
+            )
+    return open_ones
+
+
+def without(problem: Problem, names: Sequence[str]) -> tuple[int, ...]:
+    """Return the free coefficients without some."""
+    return tuple(i for i in problem.free if NAMES[i] not in names)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse of a positive definite matrix whose parameters have any units."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse: FloatArray = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
+    return inverse

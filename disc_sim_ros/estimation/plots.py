@@ -1,0 +1,72 @@
+"""Plots of an identification: measured and fitted paths, residuals over time, correlations."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from disc_sim_ros.estimation.identification import Identification
+from disc_sim_ros.estimation.observations import UNITS, Camera, Positions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def paths(result: Identification) -> 'Figure | None':
+    """Return measured and fitted paths from above and from the side; None without positions."""
+    drawn = []
+    for k, throw in enumerate(result.problem.throws):
+        residuals = result.residuals(k)
+        for o in throw.observations:
+            if isinstance(o, Positions | Camera):
+                measured = o.XYZ if isinstance(o, Positions) else o.XY
+                drawn.append((throw.name, measured, measured + residuals[o.kind]))
+    if not drawn:
+        return None
+    figure, (above, side) = _figure(2, 7.0)
+    for name, measured, fitted in drawn:
+        (line,) = above.plot(fitted[:, 0], -fitted[:, 1], label=name)
+        above.plot(measured[:, 0], -measured[:, 1], '.', ms=3, color=line.get_color(), alpha=0.5)
+        if measured.shape[1] > 2:
+            side.plot(fitted[:, 0], -fitted[:, 2], color=line.get_color())
+            side.plot(
+                measured[:, 0], -measured[:, 2], '.', ms=3, color=line.get_color(), alpha=0.5
+            )
+    above.set(xlabel='x, m', ylabel='y (left), m', title='from above: dots measured, lines fitted')
+    side.set(xlabel='x, m', ylabel='z (up), m', title='from the side')
+    above.legend(fontsize='small')
+    return figure
+
+
+def residuals(result: Identification) -> 'Figure':
+    """Return the residuals of each instrument over time."""
+    kinds = sorted({o.kind for throw in result.problem.throws for o in throw.observations})
+    figure, axes = _figure(len(kinds), 3.0 * len(kinds))
+    for ax, kind in zip(np.atleast_1d(axes), kinds, strict=True):
+        for k, throw in enumerate(result.problem.throws):
+            for o in throw.observations:
+                if o.kind == kind:
+                    r = result.residuals(k)[kind]
+                    ax.plot(o.t, np.sqrt((r**2).mean(axis=1)), lw=0.8, label=throw.name)
+        ax.axhline(result.problem.noise[kind], color='0.5', ls='--', lw=1.0)
+        ax.set(xlabel='time, s', ylabel=f'{kind}, {UNITS[kind]}', ylim=(0.0, None))
+        ax.set_title(f'{kind}: rms of the components; dashed: the noise')
+    return figure
+
+
+def correlations(result: Identification) -> 'Figure':
+    """Return the correlations of the shared parameters as a map."""
+    figure, ax = _figure(1, 4.5)
+    names = result.problem.names
+    image = ax.imshow(result.correlation, cmap='RdBu_r', vmin=-1.0, vmax=1.0)
+    ax.set_xticks(range(len(names)), names, rotation=60, ha='right')
+    ax.set_yticks(range(len(names)), names)
+    figure.colorbar(image, ax=ax)
+    ax.set_title('correlations')
+    return figure
+
+
+def _figure(rows: int, height: float) -> tuple['Figure', Any]:
+    from matplotlib.figure import Figure  # noqa: PLC0415 - slow to import
+
+    figure = Figure(figsize=(8.0, height), layout='constrained')
+    return figure, figure.subplots(rows)

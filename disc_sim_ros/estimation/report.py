@@ -1,0 +1,163 @@
+"""What an identification says: a table for a terminal, a disc file, a document for programs."""
+
+from collections.abc import Sequence
+import math
+from typing import Any
+
+import numpy as np
+import yaml
+
+from disc_sim_ros.estimation import coefficients
+from disc_sim_ros.estimation.coefficients import NAMES
+from disc_sim_ros.estimation.identification import Identification
+from disc_sim_ros.estimation.observations import UNITS
+from disc_sim_ros.physics.disc import Disc
+from disc_sim_ros.physics.disc_file import disc_document
+from disc_sim_ros.quantities import COEFFICIENTS
+
+_GOOD = 0.1  # of the spread or of the value: what counts as known well
+_OFFSETS = {'C_L0': 'lift_offset', 'C_D0': 'drag_offset', 'C_M0': 'pitching_offset'}
+
+
+def text(result: Identification, left_out_misses: Sequence[float | None]) -> str:
+    """Return the result for a terminal."""
+    problem = result.problem
+    base = result.base.values
+    lines = [
+        f'{len(problem.throws)} throw{"s" if len(problem.throws) > 1 else ""}, '
+        f'disc like {result.base.disc.name}'
+        + ('; interrupted: the best so far' if result.interrupted else '')
+    ]
+    lines.append(f'  {"coefficient":<12} {"fitted":>11} {"error":>10} {"before":>11}')
+    for name, value, error, before in zip(NAMES, result.values, result.errors, base, strict=True):
+        known = f'{error:10.2g}' if math.isfinite(error) else f'{"held":>10}'
+        lines.append(f'  {name:<12} {value:>11.5g} {known} {before:>11.5g}')
+    shared = zip(problem.names, result.x, result.shared_errors, strict=False)
+    for name, value, error in list(shared)[len(problem.free) :]:
+        unit = 'm' if name.startswith('camera') else 'm/s'
+        lines.append(f'  {name:<12} {value:>11.3g} {error:10.2g} {unit:>11}')
+    lines += [f'  left at the base: {one.reason}' for one in result.left_out]
+    strongest = _strongest(result)
+    if strongest:
+        lines.append(f'  {strongest}')
+    for kind in sorted({o.kind for throw in problem.throws for o in throw.observations}):
+        lines.append(
+            f'  residuals of {kind}: {result.rms(kind):.3g} {UNITS[kind]} rms, noise taken as '
+            f'{problem.noise[kind]:.3g} {UNITS[kind]}'
+        )
+    if result.widening > 1.0:
+        lines.append(
+            f'  residuals are correlated in time: something is not modelled; standard errors are '
+            f'{result.widening:.1f} times those of white noise'
+        )
+    for throw, miss in zip(problem.throws, left_out_misses, strict=False):
+        if miss is not None:
+            lines.append(f'  without {throw.name}: its last point is missed by {miss:.2f} m')
+    for gauge in sorted({gauge for throw in problem.throws for gauge in throw.gauges}):
+        lines.append(f'  {gauge}')
+    lines.append(f'  {verdict(result, left_out_misses)}')
+    return '\n'.join(lines)
+
+
+def _strongest(result: Identification) -> str:
+    """Return the strongest correlation of two coefficients in words; '' below 0.9."""
+    n = len(result.problem.free)
+    if n < 2:
+        return ''
+    correlation = np.abs(result.correlation[:n, :n] - np.eye(n))
+    i, j = np.unravel_index(int(np.argmax(correlation)), correlation.shape)
+    if correlation[i, j] < 0.9:
+        return ''
+    value = result.correlation[i, j]
+    names = result.problem.names
+    return f'{names[i]} and {names[j]} are correlated: {value:.3f}; together they are known better'
+
+
+def verdict(result: Identification, left_out_misses: Sequence[float | None]) -> str:
+    """Return what the result is worth, in words."""
+    spread = result.problem.prior.coefficients
+    known = [
+        name
+        for name, error, s in zip(NAMES, result.errors, spread, strict=True)
+        if math.isfinite(error) and error < _GOOD * s
+    ]
+    words = [
+        f'{len(known)} of {len(NAMES)} coefficients are known ten times better than before'
+        + (f': {", ".join(known)}' if known else '')
+    ]
+    misses = [miss for miss in left_out_misses if miss is not None]
+    if misses:
+        words.append(f'a throw that was not used is missed by {np.mean(misses):.2f} m in the mean')
+    if result.widening > 2.0:
+        words.append('the model leaves a pattern in the residuals: trust paths more than numbers')
+    return '; '.join(words)
+
+
+def disc_of(result: Identification, name: str) -> Disc:
+    """Return the identified disc."""
+    described = f'{result.base.disc.name}, with coefficients identified from throws'
+    return coefficients.disc_with(result.base, result.values, name, described)
+
+
+def disc_file(result: Identification, name: str, provenance: Sequence[str]) -> str:
+    """Return the identified disc as a disc file, with standard errors and provenance.
+
+    Args:
+        result: The identification.
+        name: Of the disc.
+        provenance: Lines on files, date, version and command, written as comments.
+    """
+    document = disc_document(disc_of(result, name))
+    uncertain = {
+        _OFFSETS[key]: float(f'{error:.3g}')
+        for key, error in zip(NAMES, result.errors, strict=True)
+        if key in _OFFSETS and math.isfinite(error)
+    }
+    if uncertain:
+        document['uncertainty'] = uncertain
+    lines = [f'# {line}' for line in provenance]
+    lines += ['#', '# Identified, with one standard error:']
+    for key, value, error in zip(NAMES, result.values, result.errors, strict=True):
+        unit = f' {COEFFICIENTS[key].unit}' if COEFFICIENTS[key].unit else ''
+        how = f'+- {error:.2g}' if math.isfinite(error) else 'held at the value of the base disc'
+        lines.append(f'#   {key:<10} {value:.6g} {how}{unit}')
+    lines += [f'#   {one.reason}' for one in result.left_out]
+    body = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=100)
+    return '\n'.join(lines) + '\n' + body
+
+
+def document(result: Identification, left_out_misses: Sequence[float | None]) -> dict[str, Any]:
+    """Return the result for programs: numbers in SI units, null where there is none."""
+    problem = result.problem
+    shared = list(zip(problem.names, result.x, result.shared_errors, strict=False))
+    return {
+        'base': result.base.disc.name,
+        'throws': [throw.name for throw in problem.throws],
+        'interrupted': result.interrupted,
+        'coefficients': {
+            name: {'value': float(value), 'error': _number(error), 'before': float(before)}
+            for name, value, error, before in zip(
+                NAMES, result.values, result.errors, result.base.values, strict=True
+            )
+        },
+        'shared': {
+            name: {'value': float(value), 'error': float(error)}
+            for name, value, error in shared[len(problem.free) :]
+        },
+        'names': list(problem.names),
+        'correlation': result.correlation.tolist(),
+        'noise': {
+            kind: {'rms': result.rms(kind), 'taken': float(problem.noise[kind])}
+            for kind in sorted({o.kind for throw in problem.throws for o in throw.observations})
+        },
+        'widening': result.widening,
+        'left_out': [one.reason for one in result.left_out],
+        'miss_without_m': {
+            throw.name: miss for throw, miss in zip(problem.throws, left_out_misses, strict=False)
+        },
+        'verdict': verdict(result, left_out_misses),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,105 @@
+"""Simulated measurements of throws, for tests, examples and comparisons."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation import local
+from disc_sim_ros.estimation.observations import (
+    ACCELERATION,
+    ATTITUDE,
+    CAMERA,
+    GYRO,
+    NOISE,
+    POSITION,
+    Accelerations,
+    Attitudes,
+    Camera,
+    Gyro,
+    Observation,
+    Positions,
+)
+from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.sampled import default_row, fly_sampled
+
+CAMERA_HEIGHT = 100.0  # m
+
+
+def measured(
+    launch: Launch,
+    setup: Setup,
+    kinds: Sequence[str],
+    generator: np.random.Generator,
+    *,
+    rate: float = 60.0,
+    noise: dict[str, float] | None = None,
+) -> list[Observation]:
+    """Return what instruments measure of a simulated flight, up to its landing.
+
+    Args:
+        launch: The release.
+        setup: The disc, air and wind, with the step of the flight.
+        kinds: The instruments, of `observations.UNITS`.
+        generator: Draws the noise, white and normal.
+        rate: Measurements of each instrument a second.
+        noise: Standard deviations by kind; others are those of `observations.NOISE`.
+    """
+    deviation = NOISE | (noise or {})
+    end = fly(launch, setup).time
+    t = np.arange(0.0, end, 1.0 / rate)
+    state = np.array(launch.state())[np.newaxis]
+    row = default_row(setup)[np.newaxis]
+    made: list[Observation] = []
+    for kind in kinds:
+        zero = np.zeros((1, 2))
+        empty = _empty(kind, t, setup.air.gravity)
+        times, places = np.unique(empty.sample_times, return_inverse=True)
+        sampled = fly_sampled(state, row, setup, times, step=setup.step, duration=0.0).states
+        sampled = sampled[:, places]
+        if kind == ATTITUDE:
+            made.append(
+                Attitudes(t, _shaken(local.disc_axis(sampled[0]), deviation[kind], generator))
+            )
+            continue
+        clean = empty.residuals(sampled, zero)[0]
+        value = clean + deviation[kind] * generator.standard_normal(clean.shape)
+        made.append(_with(empty, value))
+    return made
+
+
+def _empty(kind: str, t: FloatArray, gravity: float) -> Observation:
+    """Return measurements of zero, whose residuals are the predictions."""
+    vectors = np.zeros((len(t), 3))
+    match kind:
+        case _ if kind == POSITION:
+            return Positions(t, vectors)
+        case _ if kind == GYRO:
+            return Gyro(t, vectors)
+        case _ if kind == ACCELERATION:
+            return Accelerations(t, vectors, gravity)
+        case _ if kind == CAMERA:
+            return Camera(t, vectors[:, :2], CAMERA_HEIGHT)
+    return Attitudes(t, np.tile([0.0, 0.0, 1.0], (len(t), 1)))
+
+
+def _with(empty: Observation, value: FloatArray) -> Observation:
+    """Return measurements with values."""
+    match empty:
+        case Positions(t=t):
+            return Positions(t, value)
+        case Gyro(t=t):
+            return Gyro(t, value)
+        case Accelerations(t=t, gravity=gravity):
+            return Accelerations(t, value, gravity)
+        case Camera(t=t, height=height):
+            return Camera(t, value, height)
+    raise TypeError(empty)
+
+
+def _shaken(axes: FloatArray, deviation: float, generator: np.random.Generator) -> FloatArray:
+    """Return unit vectors turned at random by `deviation` about each direction across [rad]."""
+    turned = axes + deviation * generator.standard_normal(axes.shape)
+    unit: FloatArray = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+    return unit

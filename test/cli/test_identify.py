@@ -1,0 +1,141 @@
+"""`identify`: from a file to a disc file, and what it refuses."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from disc_sim_ros.cli import fly, identify
+from disc_sim_ros.physics.disc_file import load_disc
+from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.flight import fly as fly_disc
+from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.physics.launch import Launch
+
+
+def write(path: Path, columns: list[str], rows: object) -> Path:
+    with path.open('w', newline='') as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(rows)
+    return path
+
+
+@pytest.fixture(scope='module')
+def throw(tmp_path_factory) -> Path:
+    """Return a file with positions of a flight of `ultrastar`, to 5 mm."""
+    launch = Launch(speed=18.0, pitch=10.0, spin=60.0, height=1.3)
+    flight = fly_disc(launch, Setup(disc=load_disc('ultrastar')), sample_rate=60.0)
+    trajectory = flight.trajectory
+    noise = np.random.default_rng(1).normal(0.0, 0.005, trajectory.position.shape)
+    rows = np.column_stack([trajectory.t, map_from_paper(trajectory.position) + noise])
+    file = tmp_path_factory.mktemp('throws') / 'one.csv'
+    return write(file, ['t_s', 'x_m', 'y_m', 'z_m'], rows.tolist())
+
+
+def refused(capsys, *words: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        identify.main(list(words))
+    captured = capsys.readouterr()
+    lines = captured.err.splitlines()
+    assert end.value.code == 2
+    assert len(lines) == 1, captured.err
+    assert captured.out == ''
+    return lines[0]
+
+
+def test_a_file_becomes_a_disc_a_report_and_a_document(throw, tmp_path, capsys):
+    out, folder = tmp_path / 'mine.yaml', tmp_path / 'report'
+    words = [str(throw), '--disc', 'ultrastar', '--free', 'C_D0,C_L0', '--spin', '60']
+    words += ['--starts', '1', '--json', '--out', str(out), '--report', str(folder)]
+    assert identify.main(words) == 0
+    document = json.loads(capsys.readouterr().out)
+    for name in ('C_D0', 'C_L0'):
+        of = document['coefficients'][name]
+        assert (
+            abs(of['value'] - of['before']) < 4.0 * of['error']
+        )  # the disc that flew is the base
+    assert document['coefficients']['damping']['error'] is None
+    assert document['noise']['position']['taken'] == pytest.approx(0.005, rel=0.2)
+    assert load_disc(str(out)).mass == load_disc('ultrastar').mass
+    assert '--free C_D0,C_L0' in out.read_text() or 'Command: identify' in out.read_text()
+    page = (folder / 'report.html').read_text()
+    assert page.count('<img') == 3
+    assert 'src="http' not in page
+    assert json.loads((folder / 'report.json').read_text())['verdict'] == document['verdict']
+
+
+@pytest.mark.parametrize(
+    ('columns', 'rows', 'said'),
+    [
+        (['t_s', 'x_m', 'y_m', 'z_m'], [[0.1 * i, i, 0, 1] for i in range(4)], '4 samples'),
+        (['t_s', 'x_m', 'y_m', 'z_m'], [[1 - 0.1 * i, i, 0, i] for i in range(9)], 'increase'),
+        (['t_s', 'x_m', 'y_m', 'z_m'], [[i, 1e4 * i, 0, 1] for i in range(9)], 'm and the times'),
+        (['t_s', 'x_m', 'y_m', 'z_m'], [[i, 0.5 * i, 0, 1] for i in range(9)], 'faster than 3'),
+        (
+            ['t_s', 'x_m', 'y_m', 'z_m'],
+            [[0.2 * i, i, 0, 0.1] for i in range(20)],
+            'stays at one height',  # a rover
+        ),
+        (['t_s', 'x_m', 'y_m'], [[0.1 * i, i, 0] for i in range(20)], '--camera-height'),
+        (['x_m', 'y_m', 'z_m'], [[i, 0, 1] for i in range(9)], 't_s'),
+        (['t_s', 'a', 'b'], [[i, 0, 1] for i in range(9)], 'give columns of'),
+        (
+            ['t_s', 'p_rad_s', 'q_rad_s', 'r_rad_s'],
+            [[0.01 * i, 1, 1, 3000] for i in range(20)],
+            'degrees',
+        ),
+        (
+            ['t_s', 'p_rad_s', 'q_rad_s', 'r_rad_s'],
+            [[0.01 * i, 0, 0, 0.5] for i in range(20)],
+            'no disc',
+        ),
+        (['t_s', 'x_m', 'y_m', 'z_m'], [[0, 'nan', 0, 1]] * 9, 'finite number'),
+        (['t_s', 'x_m', 'y_m', 'z_m'], [], 'no row'),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line(tmp_path, capsys, columns, rows, said):
+    file = write(tmp_path / 'bad.csv', columns, rows)
+    assert said in refused(capsys, str(file))
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['nothing.csv'], 'cannot read it'),
+        (['nowhere'], 'nowhere'),
+        (['THROW', '--free', 'C_X'], "'C_X' is not allowed; choose from"),
+        (['THROW', '--use', 'radar'], "--use: 'radar'"),
+        (['THROW', '--use', 'gyro'], 'it has position'),
+        (['THROW', '--out', 'disc.txt'], 'ends in .yaml'),
+        (['THROW', '--wind-error', '0'], '--wind-error'),
+        (['THROW', '--disc', 'nodisc'], 'nodisc'),
+    ],
+)
+def test_a_bad_flag_is_refused_in_one_line(throw, capsys, words, said):
+    line = refused(capsys, *(str(throw) if word == 'THROW' else word for word in words))
+    assert said in line
+
+
+def test_a_folder_that_exists_is_not_written_over(throw, tmp_path, capsys):
+    assert 'exists already' in refused(capsys, str(throw), '--report', str(tmp_path))
+
+
+def test_a_bag_of_the_simulator_gives_its_disc_back(tmp_path, capsys):
+    """`fly --bag` writes what the recorder would; its Imu has no noise."""
+    pytest.importorskip('rclpy')
+    bag = tmp_path / 'bag'
+    throw = ['--disc', 'ultrastar', '--speed', '17', '--height', '1.2', '--spin', '60']
+    assert fly.main([*throw, '--roll-rate', '1', '--bag', str(bag)]) == 0
+    capsys.readouterr()
+    words = [str(bag), '--disc', 'ultrastar', '--free', 'C_D0,damping', '--starts', '1', '--json']
+    assert identify.main(words) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert set(document['noise']) >= {'position', 'attitude'}
+    # Without noise what remains is the step of the fit, 2 ms against 1 ms.
+    assert document['coefficients']['C_D0']['value'] == pytest.approx(
+        document['coefficients']['C_D0']['before'], abs=2e-4
+    )
+    assert document['coefficients']['damping']['value'] == pytest.approx(1.0, abs=0.02)
