@@ -15,8 +15,8 @@ from disc_sim_ros.paper.figure_files import PaperFigure
 TITLE = 'Fig. 9: landing position over launch roll, 19 m/s, pitch 20°'
 CONDITIONS = (
     conditions.CONDITIONS
-    + '\nThe panels print AdvR 0.5; read as r c / V it is 0.25 by eqn 63. The drawn landings '
-    'follow 0.24 to 0.25.'
+    + '\nThe panels print AdvR 0.5; read as r c / V it is 0.25 by eqn 63. At 0.24 the '
+    "text's 8 m and -6° come out as 8.2 m and -5.5°."
 )
 ROLLS = np.arange(-30.0, 31.0)  # degrees
 GRID = (-30.0, -20.0, -10.0, -5.0, 0.0, 5.0, 10.0, 20.0, 30.0)  # degrees, the paper's points

@@ -155,7 +155,7 @@ _FINE = (
 )
 _GEOMETRIC = 'the figures follow with the angle of no lift'
 _STRAIGHT = 'strong damping holds the first roll back'
-_AXIS = '0.24, within the error of reading, gives -5.5° at 10 % damping'
+_AXIS = '0.24 gives -5.5° at 10 % damping'
 _LEVEL = 'Text on Fig. 6a, b'
 
 STATEMENTS = (
