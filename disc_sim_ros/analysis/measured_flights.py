@@ -10,8 +10,8 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.bags.reader import Bag
 from disc_sim_ros.bags.topic import full_type
 from disc_sim_ros.errors import BagError
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.physics.frames import paper_from_map
+from disc_sim_ros.units import NANOSECONDS
 
 INSTRUMENTS = ('position', 'attitude', 'gyro', 'acceleration')
 _RATE = 120.0  # Hz, the most of an instrument that is used: a fit gains little from more
