@@ -197,13 +197,13 @@ ORIENTATION = Quantity(
 COEFFICIENTS = _table(
     Quantity('C_L0', '', -0.4, 0.8, None, 'Lift coefficient at angle of attack 0'),
     Quantity('C_L_slope', '1/rad', 0.5, 6.3, None, 'Mean lift slope from 0 to 10 degrees'),
-    Quantity('C_D0', '', 0.01, 0.5, None, 'Drag coefficient at angle of attack 0'),
+    Quantity('C_D0', '', 0.005, 0.5, None, 'Drag coefficient at angle of attack 0'),
     Quantity('C_D_rise', '', 0.2, 5.0, None, 'Factor of the drag above C_D0, of the base disc'),
     Quantity('C_M0', '', -0.2, 0.2, None, 'Pitching moment at angle of attack 0'),
     Quantity('C_M_slope', '1/rad', -0.5, 1.5, None, 'Mean moment slope from 0 to 10 degrees'),
     Quantity('damping', '', 0.0, 30.0, None, 'Factor of C_Lp and C_Mq of the base disc'),
     DAMPING['C_Nr'].within(-0.1),
-    Quantity('I_ratio', '', 1.5, 2.0, None, 'I_z / I_x, which sets how fast the disc wobbles'),
+    Quantity('I_ratio', '', 1.4, 2.0, None, 'I_z / I_x, which sets how fast the disc wobbles'),
 )
 IDENTIFICATION = _table(
     Quantity(
@@ -462,9 +462,9 @@ QUANTITIES = {
     **VARIED,
     **WIND,
     **DISC,
-    **DAMPING,
-    **LINEAR_AERO,
     **COEFFICIENTS,
+    **DAMPING,  # after COEFFICIENTS: C_Nr in its whole range
+    **LINEAR_AERO,
     **IDENTIFICATION,
     **CONTROL_MOMENT,
     **TIMING,

@@ -15,6 +15,7 @@ from disc_sim_ros.units import NANOSECONDS
 
 INSTRUMENTS = ('position', 'attitude', 'gyro', 'acceleration')
 _RATE = 120.0  # Hz, the most of an instrument that is used: a fit gains little from more
+_COLUMNS = 7  # of the IMU: stamp, angular velocity, specific force
 _IN_AIR = 0.2  # s, of a flight that counts
 
 Columns = dict[str, tuple[FloatArray, FloatArray]]
@@ -84,7 +85,7 @@ def _imu(bag: Bag, name: str) -> FloatArray:
     """Return stamps [ns], angular velocities and specific forces of a topic, shape (n, 7)."""
     kind = topics.MessageType.IMU
     if not any(i.name == name and full_type(i.type) == kind for i in bag.topics):
-        return np.empty((0, 7))
+        return np.empty((0, _COLUMNS))
     rows = [
         (
             m.value.header.stamp.sec * NANOSECONDS + m.value.header.stamp.nanosec,
@@ -93,7 +94,7 @@ def _imu(bag: Bag, name: str) -> FloatArray:
         )
         for m in bag.messages([name], {kind})
     ]
-    return np.array(rows, dtype=float).reshape(-1, 7)
+    return np.array(rows, dtype=float).reshape(-1, _COLUMNS)
 
 
 def _xyz(vector: object) -> tuple[float, float, float]:
