@@ -19,6 +19,7 @@ EXECUTABLES = {
     'live_view': 'disc_sim_ros.cli.live_view:main',
     'optimise': 'disc_sim_ros.cli.optimise:main',
     'paper_figures': 'disc_sim_ros.cli.paper_figures:main',
+    'policy_node': 'disc_sim_ros.cli.policy_node:main',
     'predict': 'disc_sim_ros.cli.predict:main',
     'predictor_node': 'disc_sim_ros.cli.predictor_node:main',
     'recorder_node': 'disc_sim_ros.cli.recorder_node:main',

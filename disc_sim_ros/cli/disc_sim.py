@@ -91,6 +91,12 @@ def _recorder_node() -> Program:
     return recorder_node.main
 
 
+def _policy_node() -> Program:
+    from disc_sim_ros.cli import policy_node  # noqa: PLC0415
+
+    return policy_node.main
+
+
 def _live_view() -> Program:
     from disc_sim_ros.cli import live_view  # noqa: PLC0415
 
@@ -105,6 +111,7 @@ PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
     'demo': (_demo, 'throw in real time, record and analyse the flight (ROS 2)'),
     'sim_node': (_sim_node, 'run the simulator node (ROS 2)'),
     'recorder_node': (_recorder_node, 'run the recorder node (ROS 2)'),
+    'policy_node': (_policy_node, 'steer the disc by a learned policy (ROS 2)'),
     'live_view': (_live_view, 'show the running simulators in a browser (ROS 2)'),
     'predictor_node': (_predictor_node, 'predict where a disc lands while it flies (ROS 2)'),
     'predict': (_predict, 'predict the landings of recorded throws'),

@@ -274,8 +274,8 @@ def to_lanes(rows: FloatArray, lanes: FloatArray) -> None:
 
 def from_lanes(lanes: FloatArray, count: int) -> FloatArray:
     """Return columns, shape (m, count), of blocks of lanes, shape (blocks, m, WIDTH)."""
-    columns = lanes.swapaxes(0, 1).reshape(lanes.shape[1], -1)
-    return columns[:, :count]
+    columns = lanes.swapaxes(0, 1).copy()  # a reshaped single block would be a view
+    return columns.reshape(lanes.shape[1], -1)[:, :count]
 
 
 def first_call_note() -> str:

@@ -11,7 +11,7 @@ from disc_sim_ros.physics.batch_simulator import BatchSimulator
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import MODELS, Setup
 from disc_sim_ros.physics.kernels import jit, step_batch
-from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.kernels.equations import Control, State
 from disc_sim_ros.physics.kernels.simd import WIDTH
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
@@ -181,3 +181,33 @@ def test_bad_values_are_refused_in_one_line(change, message):
 def test_turbulence_is_refused():
     with pytest.raises(ConfigError, match='turbulence'):
         BatchSimulator(Setup(disc=FRISBEE, wind=Wind(turbulence=8.0)), 4)
+
+
+@pytest.mark.parametrize('count', [1, WIDTH, 3 * WIDTH])
+def test_states_are_copies_that_later_steps_leave_alone(count):
+    batch = BatchSimulator(Setup(disc=FRISBEE, step=0.01), count)
+    rows = launches(np.random.default_rng(4), count)
+    batch.release(np.arange(count), rows, np.zeros((count, 3)))
+    before = batch.columns
+    kept = before.copy()
+    batch.advance(3)
+    assert np.array_equal(before, kept)
+    assert not np.array_equal(batch.columns, kept)
+
+
+@pytest.mark.parametrize('model', ['exact', 'precession'])
+def test_placed_states_fly_on_as_a_simulator_does(model):
+    setup, n = Setup(disc=FRISBEE, model=model, step=0.01), WIDTH + 2
+    batch = BatchSimulator(setup, n)
+    batch.release(np.arange(n), launches(np.random.default_rng(5), n), np.zeros((n, 3)))
+    batch.advance(20)
+    states, flying = batch.columns, batch.flying
+    batch.place(np.arange(n), states, np.zeros((n, 3)))
+    batch.advance(30)
+    for i in np.flatnonzero(flying):
+        sim = FlightSimulator(setup, State(*states[:, i].tolist()))
+        sim.advance(30)
+        end = sim.touch if sim.landed else sim.state
+        assert tuple(batch.present([i])[:, 0]) == end
+    with pytest.raises(ConfigError, match=r'states: .* finite'):
+        batch.place([0], np.full((14, 1), np.nan), np.zeros((1, 3)))

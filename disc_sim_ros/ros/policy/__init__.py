@@ -1,0 +1,1 @@
+"""policy_node: flies a learned policy on a sim_node."""

@@ -1,0 +1,85 @@
+"""policy_node: in lockstep the disc of a real simulator flies the path of the environment."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('gymnasium')
+
+from nav_msgs.msg import Odometry
+
+from disc_sim_ros import topics
+from disc_sim_ros.envs.policy import trained_policy
+from disc_sim_ros.envs.steer import SteerEnv
+from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.physics import frames
+from disc_sim_ros.ros.policy.node import _read
+from disc_sim_ros.ros.policy.options import policy_config
+from ros.sim_process import DEADLINE
+
+pytestmark = pytest.mark.ros
+
+LAUNCH = {'speed': 15.2, 'pitch': 14.0, 'roll': -3.0, 'yaw': 4.0, 'spin': 33.0, 'height': 1.2}
+WIND = (1.5, -2.5, 0.0)
+TARGET = (24.0, 1.0)
+RATES = {'physics_rate': 100.0, 'publish_rate': 20.0}
+
+
+def path_of_environment() -> tuple[np.ndarray, dict]:
+    """The numbers of odometry at the release and after each action, and the infos of the end."""
+    env, policy = SteerEnv(), trained_policy()
+    row, _ = env.reset(options={'launch': LAUNCH, 'wind': WIND, 'target': TARGET})
+    states, ended = [env.vector.simulator.columns[:, 0]], False
+    while not ended:
+        row, _, ended, _, info = env.step(policy(row[np.newaxis])[0])
+        states.append(env.vector.simulator.columns[:, 0])
+    return frames.odometry_array(states[:-1]), info
+
+
+def test_in_lockstep_the_path_is_that_of_the_environment_to_the_bit(ros):
+    launch = {f'launch.{name}': value for name, value in LAUNCH.items()}
+    wind = {f'wind.{axis}': value for axis, value in zip('xyz', WIND, strict=True)}
+    sim = ros.start({'auto_throw': False, **RATES, **launch, **wind})
+    messages = ros.subscribe(Odometry, topics.ODOM)
+    ros.spin_until(lambda: messages, 'odometry')  # then the subscription is matched
+    arguments = ['-p', f'target:={list(TARGET)}', '-p', 'lockstep:=true']
+    node = subprocess.Popen(
+        [sys.executable, '-m', 'disc_sim_ros.ros.policy', '--ros-args', *arguments],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ,
+    )
+    try:
+        ros.spin_until(lambda: node.poll() is not None, 'the end of policy_node', 2 * DEADLINE)
+    finally:
+        node.kill()
+        errors = node.communicate()[1]
+    assert node.returncode == 0, errors + sim.stderr
+    expected, info = path_of_environment()
+    flying = [numbers for _, numbers in map(_read, messages) if any(numbers[7:])]
+    assert len(expected) > 40
+    assert np.array_equal(np.array(flying), expected)
+    ros.spin_until(lambda: not any(_read(messages[-1])[1][7:]), 'the landed disc')
+    assert _read(messages[-1])[1][:2] == tuple(info['landing'])
+    x, y = info['landing']
+    line = f'landed at x {x:.2f} m, y {y:.2f} m, {info["miss"]:.2f} m from the target'
+    assert line in errors
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'allowed'),
+    [
+        ('target', (1e6, 0.0), '10000'),
+        ('target', (1.0,), '2 numbers'),
+        ('policy', 'none.npz', 'npz file of weights'),
+        ('lockstop', True, 'no such parameter'),
+    ],
+)
+def test_bad_parameters_are_refused(name, value, allowed):
+    with pytest.raises(ConfigError, match=allowed) as refusal:
+        policy_config({name: value})
+    assert '\n' not in str(refusal.value)
