@@ -209,7 +209,7 @@ IDENTIFICATION = _table(
     Quantity(
         'camera_height',
         'm',
-        2.0,
+        3.0,
         1000.0,
         None,
         'Height of the camera straight above the field, for positions without z',

@@ -17,9 +17,9 @@ from disc_sim_ros import topics
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.envs.pilot import Pilot
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.physics.flight_config import NANOSECONDS
 from disc_sim_ros.ros import node_main, parameters, qos
 from disc_sim_ros.ros.policy.options import POLICY_TABLE, policy_config
+from disc_sim_ros.units import NANOSECONDS
 
 PATIENCE = 60.0  # s for each answer of the simulator in lockstep; also for its start
 _RETRY = 0.5  # s; a simulator that has not yet matched a client drops its answer
