@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.envs.components import Component, Float32Array, bounds, vector
+from disc_sim_ros.physics.frames import flip
 from disc_sim_ros.physics.kernels.rotation import rotated, rotation_elements
 
 PERIOD = 0.05  # s from one action to the next
@@ -75,7 +76,7 @@ def observations(
     rows[6:9] = (now - before) / PERIOD
     rows[9], rows[10], rows[11] = up_x, up_y, up_z
     rows[12:15] = rotated(elements, (p, q, 0.0))
-    rows[15] = 0.0 - r
+    rows[15] = flip(r)
     clipped: Float32Array = rows.T.astype(np.float32).clip(_LOW, _HIGH)
     return clipped, now
 

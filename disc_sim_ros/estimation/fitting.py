@@ -18,6 +18,7 @@ from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw, tilted
 
 _CORNER = 2.5  # standard deviations at which the loss of a residual turns from square to straight
 _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
+_HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone
 _MOST_TRIES = 8  # of a step with more and more damping
 _KEPT = 3  # starts that are fitted, of those that are tried
 _FIRST_STEPS = 8
@@ -183,6 +184,9 @@ def solve(
     x[:n] = np.clip(x[:n], low, high)
     x, cost = _released(problem, x)
     damping = 1e-3
+    measured = sum(
+        len(problem.residuals(k, problem.here(k, x))) for k in range(len(problem.throws))
+    )
     count = 0
     for count in range(1, most_steps + 1):
         keeper.offer(x, cost)
@@ -208,7 +212,7 @@ def solve(
                 x, cost, damping = tried, tried_cost, damping * 0.1
                 break
             damping = max(damping * 10.0, 1e-6)
-        if before - cost < _SMALL:
+        if before - cost < _SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0):
             break
     keeper.offer(x, cost)
     return Solution(x, cost, count)

@@ -4,8 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import Identification
 from disc_sim_ros.estimation.observations import UNITS, Camera, Positions
+from disc_sim_ros.physics.frames import map_from_paper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,22 +21,27 @@ def paths(result: Identification) -> 'Figure | None':
         for o in throw.observations:
             if isinstance(o, Positions | Camera):
                 measured = o.XYZ if isinstance(o, Positions) else o.XY
-                drawn.append((throw.name, measured, measured + residuals[o.kind]))
+                fitted = measured + residuals[o.kind]
+                drawn.append((throw.name, _in_map(measured), _in_map(fitted)))
     if not drawn:
         return None
     figure, (above, side) = _figure(2, 7.0)
     for name, measured, fitted in drawn:
-        (line,) = above.plot(fitted[:, 0], -fitted[:, 1], label=name)
-        above.plot(measured[:, 0], -measured[:, 1], '.', ms=3, color=line.get_color(), alpha=0.5)
+        (line,) = above.plot(fitted[:, 0], fitted[:, 1], label=name)
+        above.plot(measured[:, 0], measured[:, 1], '.', ms=3, color=line.get_color(), alpha=0.5)
         if measured.shape[1] > 2:
-            side.plot(fitted[:, 0], -fitted[:, 2], color=line.get_color())
-            side.plot(
-                measured[:, 0], -measured[:, 2], '.', ms=3, color=line.get_color(), alpha=0.5
-            )
+            side.plot(fitted[:, 0], fitted[:, 2], color=line.get_color())
+            side.plot(measured[:, 0], measured[:, 2], '.', ms=3, color=line.get_color(), alpha=0.5)
     above.set(xlabel='x, m', ylabel='y (left), m', title='from above: dots measured, lines fitted')
     side.set(xlabel='x, m', ylabel='z (up), m', title='from the side')
     above.legend(fontsize='small')
     return figure
+
+
+def _in_map(points: FloatArray) -> FloatArray:
+    """Return points of two or three components in `map`."""
+    d = points.shape[1]
+    return map_from_paper(np.pad(points, ((0, 0), (0, 3 - d))))[:, :d]
 
 
 def residuals(result: Identification) -> 'Figure':

@@ -237,7 +237,7 @@ class Predictor:
         for i, a in of_wind.items():
             for j, b in of_wind.items():
                 spread[i, j] = linear.covariance[a, b]
-        turn = np.diag([1.0, -1.0, 1.0])  # X, Y, time to x, y, time
+        turn = np.diag([*map_from_paper(np.ones(3))[:2], 1.0])  # X, Y, time to x, y, time
         covariance = turn @ estimator.landing_covariance(profiled=profiled) @ turn
         if not data.has_axis:
             covariance = WITHOUT_ATTITUDE * covariance
@@ -284,7 +284,7 @@ class Predictor:
         return prediction.reference_time + times, flown.states[0]
 
 
-_TO_MAP = np.diag([1.0, -1.0, -1.0] * 2)
+_TO_MAP = np.diag(np.tile(map_from_paper(np.ones(3)), 2))
 
 
 def _has_ended(fitted: Fitted, data: Measurements) -> bool:

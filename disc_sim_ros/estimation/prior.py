@@ -9,6 +9,7 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.local import disc_axis
 from disc_sim_ros.physics.disc import Disc
+from disc_sim_ros.physics.frames import flip
 
 # Standard deviations of the offsets of a disc whose file states none: about as discs of one kind
 # differ in one wind tunnel (docs/discs.md).
@@ -95,7 +96,7 @@ def manner(states: FloatArray) -> FloatArray:
     down = disc_axis(states)
     nose = np.arcsin(np.clip(np.sum(down * forward, axis=1), -1.0, 1.0))
     bank = -np.arcsin(np.clip(np.sum(down * right, axis=1), -1.0, 1.0))
-    climb = np.arctan2(-forward[:, 2], level)
+    climb = np.arctan2(flip(forward[:, 2]), level)
     return np.column_stack([speed, climb, nose, bank, states[:, 10:13]])
 
 

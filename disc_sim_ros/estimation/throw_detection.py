@@ -4,6 +4,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.throw_estimator import straight
+from disc_sim_ros.physics.frames import flip
 
 WINDOW = 0.2  # s, in which a beginning is recognised
 LEAST = 6  # measurements of a beginning ...
@@ -39,7 +40,7 @@ def beginning(time: FloatArray, position: FloatArray, sigma: FloatArray) -> int 
 def _is_flight(t: FloatArray, position: FloatArray, sigma: FloatArray) -> bool:
     """Return True if points lie on a line at constant velocity, but for gravity and air."""
     velocity, start = straight(t, position)
-    if float(np.linalg.norm(velocity)) < LEAST_SPEED or -start[2] < LEAST_HEIGHT:
+    if float(np.linalg.norm(velocity)) < LEAST_SPEED or flip(start[2]) < LEAST_HEIGHT:
         return False
     bend = _AERODYNAMIC * t[-1] ** 2 / 16.0  # of a parabola from its chord, half of it
     off = position - start - t[:, None] * velocity

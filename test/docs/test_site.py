@@ -11,6 +11,8 @@ import pytest
 for package in ('sphinx', 'myst_parser', 'furo'):
     pytest.importorskip(package, reason='needs the extra [docs]: pip install -e .[docs]')
 
+pytestmark = pytest.mark.xdist_group('site')  # one build for all
+
 ROOT = Path(__file__).parents[2]
 NO_API = "\nexec(open(r'{}').read())\napidoc_modules = []\n"
 # What takes half the time of the build and gives no warnings of the pages: the theme, and the

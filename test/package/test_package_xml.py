@@ -35,7 +35,15 @@ KEYS |= {
 # rosdep has no keys for the others that mcap-ros2-support brings along.
 KEYS |= dict.fromkeys(('mcap', 'mcap_ros2', 'lz4', 'zstandard'), 'mcap-ros2-support')
 # Not in rosdep, or not in Ubuntu 24.04; or part of newer distributions only.
-OPTIONAL = {'distributed', 'llvmlite', 'numba', 'pyarrow', 'simulation_interfaces', 'websockets'}
+OPTIONAL = {
+    'distributed',
+    'gymnasium',
+    'llvmlite',
+    'numba',
+    'pyarrow',
+    'simulation_interfaces',
+    'websockets',
+}
 STARTED = {'ros2launch'}
 
 

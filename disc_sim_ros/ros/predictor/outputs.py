@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.predictor import Prediction
-from disc_sim_ros.physics.frames import odometry_array, rotation_matrix
+from disc_sim_ros.physics.frames import map_from_paper, odometry_array, rotation_matrix
 from disc_sim_ros.ros import messages
 from disc_sim_ros.topics import Frames
 from disc_sim_ros.units import NANOSECONDS
@@ -20,7 +20,7 @@ from disc_sim_ros.units import NANOSECONDS
 SHARES = {50: 1.386, 90: 4.605}
 _LOW = 0.02  # m, height of the ellipses over the ground
 _COLOURS = {50: (0.835, 0.369, 0.0, 0.6), 90: (0.835, 0.369, 0.0, 0.25)}
-_FLIP = np.diag([1.0, -1.0, -1.0])
+_FLIP = np.diag(map_from_paper(np.ones(3)))
 _LIFETIME = 2  # s, of an ellipse that is not renewed
 
 
