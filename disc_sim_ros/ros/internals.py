@@ -103,6 +103,10 @@ class PolledSubscription:
         take = _take_message_of(self._subscription)
         self.take = self._dequeue if take is None else partial(take, message_type, raw)
 
+    def has_publishers(self) -> bool:
+        """Return True while a publisher is matched; for any thread."""
+        return self._subscription.get_publisher_count() > 0
+
     def destroy(self) -> None:
         """Unsubscribe."""
         self._node.destroy_subscription(self._subscription)

@@ -91,6 +91,7 @@ def test_messages_are_taken_in_order(node, remove, removed, raw):
     assert (subscription.take == subscription._dequeue) == bool(removed)
     publisher = node.create_publisher(Int64, 'count', RELIABLE)
     node.spin_until(publisher.get_subscription_count)
+    node.spin_until(subscription.has_publishers)
     assert subscription.take() is None
     taken = []
     for n in range(100):

@@ -67,10 +67,14 @@ class Commands:
         """Subscribe to every command topic; without a node no command ever arrives."""
         self._order = itertools.count()
 
+        self._subscriptions: list[PolledSubscription] = []
+
         def topic(name: str, message_type: type, convert: Callable[..., Any]) -> CommandTopic:
             take: Callable[[], Taken | None] = _no_message
             if node is not None:
-                take = PolledSubscription(node, message_type, name, qos.COMMAND_QOS).take
+                subscription = PolledSubscription(node, message_type, name, qos.COMMAND_QOS)
+                self._subscriptions.append(subscription)
+                take = subscription.take
             return CommandTopic(name, take, lambda message: convert(message, frames))
 
         self.moment = topic(topics.CMD_MOMENT, WrenchStamped, messages.moment_from_wrench)
@@ -80,6 +84,11 @@ class Commands:
         self.wind = topic(topics.WIND, Vector3Stamped, messages.wind_from_vector)
         self.throw = topic(topics.THROW, Odometry, messages.release_from_odometry)
         self.all = (self.moment, self.coefficients, self.wind, self.throw)
+
+    @property
+    def have_publishers(self) -> bool:
+        """Return True if a publisher of commands is matched: one may arrive at any moment."""
+        return any(subscription.has_publishers() for subscription in self._subscriptions)
 
     def poll(self, now: int, on_drop: Callable[[CommandTopic], None]) -> None:
         """Take the messages that have arrived, and put them in order of their stamps.

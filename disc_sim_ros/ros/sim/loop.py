@@ -20,6 +20,7 @@ from disc_sim_ros.ros.sim.simulation import Counts, Simulation
 LONGEST_SLEEP = 0.01  # s
 LONGEST_WAIT = 0.5  # s of wall time that a request waits for the next message
 LONGEST_QUANTUM = 1e-3  # s of simulated time between two polls of the command topics, at a pace
+UNWATCHED_QUANTUM = 5e-3  # s, the same while no publisher of commands and no clock is matched
 FAST_QUANTUM = 0.02  # s of simulated time, as fast as possible, where it takes almost no wall time
 _SLOWEST = 1e-9  # the pacer's real-time factor where there is no pace
 
@@ -202,14 +203,15 @@ class SimLoop(threading.Thread):
         if config.real_time_factor == 0.0:
             time.sleep(0)  # lets other threads run
             return self._quantum(FAST_QUANTUM)
-        quantum = self._quantum(LONGEST_QUANTUM)
+        watched = self._simulation.commands.have_publishers or self._publishers.clock_is_followed
+        quantum = self._quantum(LONGEST_QUANTUM if watched else UNWATCHED_QUANTUM)
         wait = self.pacer.wait(time.monotonic(), quantum)
         if wait > 0.0:
             if self._requests:
                 self._wake.clear()
             time.sleep(min(wait, LONGEST_SLEEP))
         slips = self.pacer.slips
-        steps = self.pacer.due(time.monotonic())
+        steps = self.pacer.due(time.monotonic(), quantum)
         if self.pacer.slips > slips:
             jumped = self._follow_wall('slip', steps)
             self._warn(
@@ -245,9 +247,9 @@ class SimLoop(threading.Thread):
         return True
 
     def _quantum(self, longest: float) -> int:
-        """Return how many steps to make between two polls of the command topics."""
-        config = self._simulation.config
-        return max(1, min(config.steps_per_publish, round(longest / config.setup.step)))
+        """Return how many steps to make until the next poll of the command topics."""
+        sim = self._simulation
+        return max(1, min(sim.steps_to_message, round(longest / sim.config.setup.step)))
 
     def _advance(self, steps: int, *, serve: bool) -> None:
         """Make steps, stopping at each where a command begins or ends or a message is due."""

@@ -100,6 +100,11 @@ class Publishers:
         wind.header.frame_id = map_
         self.applied_wind = sink(topics.APPLIED_WIND, wind, messages.VECTOR_FIELDS)
 
+    @property
+    def clock_is_followed(self) -> bool:
+        """Return True if `/clock` has subscribers."""
+        return self.clock is not None and self.clock.has_subscribers
+
     def publish_clock(self, nanoseconds: int, *, delay: float = -qos.CLOCK_PERIOD) -> None:
         """Publish `/clock` if it has subscribers, at most every CLOCK_PERIOD of wall time.
 

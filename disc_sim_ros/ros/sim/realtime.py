@@ -46,9 +46,14 @@ class Pacer:
         self._done = 0
         self.restarts += 1
 
-    def due(self, now: float) -> int:
-        """Return how many steps are due at `now`, after slipping if the stall was too long."""
-        late = now - self._epoch - (self._done + 1) * self._period
+    def due(self, now: float, steps: int = 1) -> int:
+        """Return how many steps are due at `now`, after slipping if the stall was too long.
+
+        Args:
+            now: The steady clock [s].
+            steps: The deadline is that of the last of so many steps; before it none is due.
+        """
+        late = now - self._epoch - (self._done + steps) * self._period
         if late < 0.0:
             return 0
         self.worst = max(self.worst, late)

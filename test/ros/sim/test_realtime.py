@@ -28,6 +28,15 @@ def test_lateness_does_not_add_up(rate):
     assert pacer.wait(50.0 + 1000 * period, 1) == pytest.approx(period)
 
 
+def test_lateness_counts_from_the_deadline_of_all_the_steps_that_it_slept_for():
+    pacer = Pacer(STEP, 1.0, 0.0)
+    assert pacer.due(0.0045, 5) == 0
+    assert not pacer.recent
+    assert pacer.due(0.0052, 5) == 5
+    assert pacer.quantile(0.5) == pytest.approx(0.0002)
+    assert pacer.missed == 0
+
+
 def test_a_short_stall_is_caught_up_and_a_long_one_slips():
     pacer = Pacer(STEP, 1.0, 0.0)
     assert run(pacer, [0.0005, 0.001, 0.051]) == [0, 1, 50]
