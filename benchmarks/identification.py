@@ -4,21 +4,26 @@ python benchmarks/identification.py --kinds position,gyro --sessions 20
 """
 
 import argparse
+from dataclasses import replace
+from pathlib import Path
+import sys
 import time
 
 import numpy as np
 
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.estimation import synthetic
-from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
+from disc_sim_ros.estimation.coefficients import NAMES, base_of
 from disc_sim_ros.estimation.identification import identify
 from disc_sim_ros.estimation.observations import GYRO
-from disc_sim_ros.estimation.throws import Throw, throw_of
+from disc_sim_ros.estimation.throws import Throw
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.quantities import COEFFICIENT_SPREAD, COEFFICIENTS
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from estimation import synthetic_sessions
 
 BASE = Setup(disc=load_disc('ultrastar'))
 SHARE = 0.3  # of the spread of discs: how far the true disc lies from the base, one deviation
@@ -42,24 +47,12 @@ def session(
     """Return the true coefficients, the true wind and the throws of a session."""
     generator = np.random.default_rng(seed)
     values = truth(generator)
-    disc = disc_with(base_of(BASE), values, 'true', '')
     wind = generator.normal(0.0, 2.0, 2)
-    setup = Setup(disc=disc, step=0.002, wind=Wind(mean=(wind[0], -wind[1], 0.0)))
-    throws = []
-    for k in range(count):
-        launch = Launch(
-            speed=generator.uniform(14.0, 20.0),
-            pitch=generator.uniform(5.0, 15.0),
-            roll=generator.uniform(-15.0, 15.0),
-            angle_of_attack=generator.uniform(0.0, 8.0),
-            spin=generator.uniform(45.0, 75.0),
-            height=1.3,
-            roll_rate=generator.normal(0.0, 2.0),
-            pitch_rate=generator.normal(0.0, 2.0),
-        )
-        made = synthetic.measured(launch, setup, kinds, generator)
-        spin = None if GYRO in kinds else launch.spin + SPIN_ERROR * generator.standard_normal()
-        throws.append(throw_of(f'throw {k + 1}', made, disc, spin=spin))
+    setup = replace(BASE, step=0.002, wind=Wind(mean=flip_yz((*wind, 0.0))))
+    error = None if GYRO in kinds else SPIN_ERROR
+    throws = synthetic_sessions.session(
+        values, setup, kinds, generator, count=count, spin_error=error
+    )
     return values, wind, throws
 
 

@@ -13,7 +13,6 @@ from disc_sim_ros.errors import BagError
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.units import NANOSECONDS
 
-INSTRUMENTS = ('position', 'attitude', 'gyro', 'acceleration')
 _RATE = 120.0  # Hz, the most of an instrument that is used: a fit gains little from more
 _COLUMNS = 7  # of the IMU: stamp, angular velocity, specific force
 _IN_AIR = 0.2  # s, of a flight that counts

@@ -4,6 +4,7 @@ import argparse
 import base64
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 import html
 import io
 import json
@@ -13,11 +14,11 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from disc_sim_ros import __version__, files
+from disc_sim_ros import __version__, files, validation
 from disc_sim_ros.cli import flags, output
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.cli.main import run_program
-from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file, flight
 from disc_sim_ros.physics.disc import AERODYNAMICS
 from disc_sim_ros.quantities import COEFFICIENTS, IDENTIFICATION, LAUNCH, MEAN_WIND
@@ -29,21 +30,22 @@ if TYPE_CHECKING:
     from disc_sim_ros.estimation.problem import Prior
     from disc_sim_ros.estimation.throws import Throw
 
-_INSTRUMENTS = ('position', 'attitude', 'gyro', 'acceleration')
 _USED = ('position', 'attitude', 'gyro')  # unless --use says otherwise
 _EVERY = 2.0  # s between two lines of progress
 
 
 def parser(prog: str = 'identify') -> Parser:
     """Return the command line of `identify`."""
+    from disc_sim_ros.estimation.throw_csv import GROUPS  # noqa: PLC0415 - numpy is slow
+
     p = Parser(
         prog=prog,
         description='Find the coefficients of a disc from measured throws: bags with Odometry or '
         'PoseStamped (and Imu), or CSV files with the columns t_s; x_m, y_m, z_m; qx, qy, qz, qw; '
         'p_rad_s, q_rad_s, r_rad_s; fx_m_s2, fy_m_s2, fz_m_s2; throw. All throws are of one disc '
         'in one wind. Coefficients that the throws do not determine keep the value of --disc.',
-        epilog='Exit code 0; 1: a file cannot be written; 2: bad input; 130: Ctrl-C, after the '
-        'best result so far.',
+        epilog='Exit code 0; 1: a bag cannot be read, or a file not be written; 2: bad input; '
+        '130: Ctrl-C, after the best result so far.',
     )
     p.set_defaults(prog=prog)
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
@@ -89,7 +91,7 @@ def parser(prog: str = 'identify') -> Parser:
         '--use',
         default=argparse.SUPPRESS,
         metavar='NAME,...',
-        help=f'instruments to use, of {", ".join(_INSTRUMENTS)} (default: {", ".join(_USED)})',
+        help=f'instruments to use, of {", ".join(GROUPS)} (default: {", ".join(_USED)})',
     )
     add_quantity(made, '--spin', LAUNCH['spin'], default=argparse.SUPPRESS)
     for name in ('camera_height', 'accelerometer_range'):
@@ -124,17 +126,12 @@ def parser(prog: str = 'identify') -> Parser:
 
 def main(arguments: Sequence[str] | None = None, prog: str = 'identify') -> int:
     """Run `identify` and return its exit code."""
-    return run_program(parser(prog), _run, arguments, in_flags=flags.in_flags)
+    words = sys.argv[1:] if arguments is None else arguments
+    return run_program(parser(prog), partial(_run, words=words), words, in_flags=flags.in_flags)
 
 
-def _run(chosen: argparse.Namespace) -> int:
-    out, report_folder = getattr(chosen, 'out', None), getattr(chosen, 'report', None)
-    if out is not None:
-        if not disc_file.is_file(out):
-            raise ConfigError('--out', out, 'give a name that ends in .yaml')
-        output.check_writable('--out', out)
-    if report_folder is not None:
-        files.check_new_folder('--report', Path(report_folder))
+def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
+    _check_outputs(chosen)
     setup = flight.Setup(
         disc=disc_file.load_disc(chosen.disc),
         model=chosen.model,
@@ -148,6 +145,9 @@ def _run(chosen: argparse.Namespace) -> int:
 
     if note := sampled.first_call_note():
         output.note(chosen.prog, note)
+    n = len(throws)
+    stages = (*identification.stages(n, chosen.starts), *crossvalidation.stages(n))
+    progress = _Progress(chosen.prog, stages)
     result = identification.identify(
         throws,
         setup,
@@ -156,36 +156,61 @@ def _run(chosen: argparse.Namespace) -> int:
         anyway=chosen.anyway,
         starts=chosen.starts,
         seed=chosen.seed,
-        progress=_Progress(chosen.prog),
+        progress=progress,
     )
     misses: list[float | None] = []
     if not result.interrupted:
-        misses = crossvalidation.left_out_misses(result)
+        misses = crossvalidation.left_out_misses(result, progress)
     if chosen.json:
         output.show(json.dumps(report.document(result, misses), allow_nan=False))
     else:
         output.show(report.text(result, misses))
-    said = []
-    if out is not None:
-        text = report.disc_file(result, Path(out).stem, _provenance(chosen))
-        output.write_whole('--out', out, text.encode())
-        said.append(f'wrote {out}: fly --disc {out}')
-    if report_folder is not None:
-        _write_report(Path(report_folder), result, misses, _provenance(chosen))
-        said.append(f'wrote {Path(report_folder) / "report.html"}')
-    for line in said:
+    _write_outputs(chosen, result, misses, _provenance(chosen, words))
+    return 130 if result.interrupted else 0
+
+
+def _check_outputs(chosen: argparse.Namespace) -> None:
+    """Refuse files that cannot be written, before anything is computed."""
+    if hasattr(chosen, 'out'):
+        if not disc_file.is_file(chosen.out):
+            raise ConfigError('--out', chosen.out, 'give a name that ends in .yaml')
+        output.check_writable('--out', chosen.out)
+    if hasattr(chosen, 'report'):
+        files.check_new_folder('--report', Path(chosen.report))
+
+
+def _write_outputs(
+    chosen: argparse.Namespace,
+    result: 'Identification',
+    misses: Sequence[float | None],
+    provenance: Sequence[str],
+) -> None:
+    """Write the report and the disc file that were asked for, and name them."""
+    from disc_sim_ros.estimation import report  # noqa: PLC0415
+
+    written = []
+    if hasattr(chosen, 'report'):
+        _write_report(Path(chosen.report), result, misses, provenance)
+        written.append(f'wrote {Path(chosen.report) / "report.html"}')
+    if hasattr(chosen, 'out') and result.problem.free:
+        text = report.disc_file(result, Path(chosen.out).stem, provenance)
+        output.write_whole('--out', chosen.out, text.encode())
+        written.append(f'wrote {chosen.out}: fly --disc {shlex.quote(chosen.out)}')
+    for line in written:
         if chosen.json:
             output.note(chosen.prog, line)
         else:
             output.show(line)
-    return 130 if result.interrupted else 0
+    if hasattr(chosen, 'out') and not result.problem.free:
+        why = 'not written, because these throws determine no coefficient'
+        raise DiscSimError(f'{chosen.out}: {why}')
 
 
 class _Progress:
-    """Shows the stage and the cost on stderr, at most every two seconds."""
+    """Shows stage, cost and a guess of the time left on stderr, at most every two seconds."""
 
-    def __init__(self, prog: str) -> None:
-        self._prog, self._last = prog, time.monotonic()
+    def __init__(self, prog: str, stages: Sequence[str]) -> None:
+        self._prog, self._last, self._stages = prog, time.monotonic(), stages
         self._started = self._last
 
     def __call__(self, stage: str, count: int, cost: float) -> None:
@@ -194,7 +219,11 @@ class _Progress:
         if now - self._last >= _EVERY:
             self._last = now
             tail = f', half squares {cost:.1f}' if cost == cost else ''  # noqa: PLR0124 - not nan
-            output.note(self._prog, f'{now - self._started:.0f} s: {stage}, step {count}{tail}')
+            spent = now - self._started
+            done = self._stages.index(stage) if stage in self._stages else 0
+            if done:  # as if every stage took as long
+                tail += f'; about {spent / done * (len(self._stages) - done):.0f} s left'
+            output.note(self._prog, f'{spent:.0f} s: {stage}, step {count}{tail}')
 
 
 def _prior(chosen: argparse.Namespace) -> 'Prior':
@@ -214,6 +243,7 @@ def _prior(chosen: argparse.Namespace) -> 'Prior':
 
 def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
     from disc_sim_ros.estimation.measured import Instruments, throw_from  # noqa: PLC0415
+    from disc_sim_ros.estimation.throw_csv import GROUPS  # noqa: PLC0415
 
     instruments = Instruments(
         gravity=setup.air.gravity,
@@ -223,8 +253,7 @@ def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
     )
     used = _listed(chosen, 'use') or list(_USED)
     for name in used:
-        if name not in _INSTRUMENTS:
-            raise ConfigError('--use', name, f'choose from {", ".join(_INSTRUMENTS)}')
+        validation.choice('--use', name, GROUPS)
     throws = []
     for source in chosen.throws:
         measured = _read(source)
@@ -246,12 +275,8 @@ def _read(source: str) -> 'dict[str, dict]':  # type: ignore[type-arg]
         return throw_csv.read(source)  # type: ignore[return-value]
     from disc_sim_ros.analysis import measured_flights  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
-    from disc_sim_ros.errors import BagError  # noqa: PLC0415
 
-    try:
-        return measured_flights.measured(open_bag(source))
-    except BagError as error:
-        raise ConfigError('throws', source, str(error).removeprefix(f'{source}: ')) from None
+    return measured_flights.measured(open_bag(source))
 
 
 def _listed(chosen: argparse.Namespace, name: str) -> list[str] | None:
@@ -260,10 +285,9 @@ def _listed(chosen: argparse.Namespace, name: str) -> list[str] | None:
     return None if text is None else [word.strip() for word in text.split(',') if word.strip()]
 
 
-def _provenance(chosen: argparse.Namespace) -> list[str]:
+def _provenance(chosen: argparse.Namespace, words: Sequence[str]) -> list[str]:
     """Return what made a result: version, date, command."""
     day = datetime.now(UTC).strftime('%Y-%m-%d')
-    words = sys.argv[1:] if Path(sys.argv[0]).stem == chosen.prog else chosen.throws
     return [
         f'Identified by disc_sim_ros {__version__} on {day} from {len(chosen.throws)} files:',
         *(f'  {source}' for source in chosen.throws),

@@ -36,7 +36,7 @@ def parser(prog: str = 'predict') -> Parser:
         'landing. The landing is that of the last prediction, when the disc was nearly down. '
         'FILE: a bag with nav_msgs/Odometry or geometry_msgs/PoseStamped, or a CSV file with the '
         'columns t_s, x_m, y_m, z_m (map: x forward, y left, z up) and, if attitudes were '
-        'measured, qx, qy, qz, qw.',
+        'measured, qx, qy, qz, qw; a column `throw` separates several.',
         epilog='Exit code 0; 1 if no throw was found; 2 for bad input.',
     )
     p.set_defaults(prog=prog)
@@ -74,13 +74,14 @@ def _run(chosen: argparse.Namespace) -> int:
     if plot is not None:
         output.check_plot(plot)
     config = _config(chosen)
-    measurements = _measurements(chosen)
+    series = _measurements(chosen)
     note = sampled.first_call_note()
     if note:
         output.note(chosen.prog, note)
-    throws = replay(measurements, config)
+    throws = replay(series, config)
     if not throws:
-        raise DiscSimError(f'{chosen.source}: no throw in {len(measurements)} measurements')
+        count = sum(len(measurements) for measurements in series)
+        raise DiscSimError(f'{chosen.source}: no throw in {count} measurements')
     if chosen.json:
         document = {'throws': [_document(throw) for throw in throws]}
         output.show(json.dumps(document, allow_nan=False))
@@ -101,19 +102,20 @@ def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
     return predictor_config(setup, {name: getattr(chosen, name) for name in PREDICTION})
 
 
-def _measurements(chosen: argparse.Namespace) -> 'list[Measurement]':
+def _measurements(chosen: argparse.Namespace) -> 'list[list[Measurement]]':
+    """Return the measurements of each recording: of a bag, or of each throw of a file."""
     from disc_sim_ros.estimation import replay  # noqa: PLC0415
 
     source = Path(chosen.source)
     if source.suffix.lower() == '.csv':
         if chosen.topic is not None:
             raise ConfigError('--topic', chosen.topic, 'a CSV file has no topics')
-        read = replay.read_csv(source)
+        series = replay.read_csv(source)
     else:
-        read = _of_bag(source, chosen.topic)
+        series = [_of_bag(source, chosen.topic)]
     if chosen.position_only:
-        return [dataclasses.replace(m, axis=None) for m in read]
-    return read
+        return [[dataclasses.replace(m, axis=None) for m in of] for of in series]
+    return series
 
 
 def _of_bag(source: Path, topic: str | None) -> 'list[Measurement]':

@@ -5,18 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.fitting import solve
+from disc_sim_ros.estimation.fitting import Progress, solve
 from disc_sim_ros.estimation.identification import Identification
 from disc_sim_ros.estimation.observations import Camera, Observation, Positions
 from disc_sim_ros.estimation.problem import Prior, Problem
-from disc_sim_ros.estimation.throws import Throw
 
 _WATCHED = 0.3  # share of a throw from which its release is fitted
 _FEWEST = 6  # samples in it
 _KNOWN = 1e-3  # deviation of a wind that other throws told [m/s]
 
 
-def left_out_misses(result: Identification) -> list[float | None]:
+def left_out_misses(
+    result: Identification, progress: Progress | None = None
+) -> list[float | None]:
     """Return by how much each throw is missed by a fit of the others [m].
 
     Coefficients and wind are those of the other throws. The release of the throw is fitted to the
@@ -24,6 +25,7 @@ def left_out_misses(result: Identification) -> list[float | None]:
 
     Args:
         result: The identification with all throws.
+        progress: Called with a stage of `stages`, a count and the cost.
 
     Returns:
         A miss for each throw; None for one without positions, and for a throw that is alone.
@@ -32,16 +34,27 @@ def left_out_misses(result: Identification) -> list[float | None]:
     n = len(problem.throws)
     if n < 2:
         return [None]
-    return [_miss(problem, result.x, k) for k in range(n)]
+    return [_miss(problem, result.x, k, progress) for k in range(n)]
 
 
-def _miss(problem: Problem, x: FloatArray, k: int) -> float | None:
+def stages(throws: int) -> tuple[str, ...]:
+    """Return the stages of `left_out_misses` in their order, for a guess of the time left."""
+    return tuple(_stage(k, throws) for k in range(throws if throws > 1 else 0))
+
+
+def _stage(k: int, throws: int) -> str:
+    return f'throw {k + 1} of {throws} from the others'
+
+
+def _miss(problem: Problem, x: FloatArray, k: int, progress: Progress | None) -> float | None:
     throw = problem.throws[k]
     path = next((o for o in throw.observations if isinstance(o, Positions | Camera)), None)
     if path is None or len(path.t) * _WATCHED < _FEWEST:
         return None
     rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
-    shared = solve(rest, np.delete(x, np.r_[problem.own(k)])).x[: problem.shared]
+    stage = _stage(k, len(problem.throws))
+    first = np.delete(x, np.r_[problem.own(k)])
+    shared = solve(rest, first, progress=progress, stage=stage).x[: problem.shared]
     free = len(problem.free)
     held = problem.held.copy()
     held[list(problem.free)] = shared[:free]
@@ -72,8 +85,3 @@ def _until(o: Observation, end: float) -> Observation:
         if isinstance(value, np.ndarray) and len(value) == len(o.t)
     }
     return replace(o, **values)  # type: ignore[type-var]
-
-
-def watched(throw: Throw, seconds: float) -> Throw:
-    """Return a throw as seen up to a time."""
-    return replace(throw, observations=tuple(_until(o, seconds) for o in throw.observations))

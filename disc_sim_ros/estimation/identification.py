@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+import math
 import os
 
 import numpy as np
@@ -32,6 +33,7 @@ _NORMAL = 1.4826  # standard deviation over median of the absolute values, of no
 _WORST_FIT = 30.0  # times the usual noise of an instrument: beyond, it is no flight of such a disc
 _START_SPREAD = 0.5  # of the prior: how far other starts lie
 _START_STEPS = 12
+_ROUNDS = 2  # of estimating the noise and fitting with it
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,8 @@ def identify(
 
     Raises:
         ConfigError: A name is unknown, the throws do not determine a coefficient of `free`, or no
-            disc like the base disc flies so.
+            disc like the base disc flies so. Where they determine none at all, releases and wind
+            are fitted with the coefficients of the base disc.
     """
     if not throws:
         raise ConfigError('throws', 0, 'give at least one throw')
@@ -175,7 +178,7 @@ def identify(
         problem, x = _without_each(problem, solution, progress)
         best = Best(x)
         given = set(noise or {})
-        for _ in range(2):
+        for _ in range(_ROUNDS):
             estimated = _noise(problem, x, given)
             changed = max(abs(estimated[kind] / problem.noise[kind] - 1.0) for kind in estimated)
             _refuse_misfit(problem, estimated, given)
@@ -192,6 +195,26 @@ def identify(
     return Identification(
         problem, x, known.covariance(), known.widening, tuple(left_out), interrupted, seed
     )
+
+
+def stages(throws: int, starts: int) -> tuple[str, ...]:
+    """Return the stages of an identification in their order, for a guess of the time left."""
+    return (
+        'releases',
+        *(_start_stage(number, starts) for number in range(starts)),
+        'fit',
+        *(_without_stage(k, throws) for k in range(throws if throws > 1 else 0)),
+        'noise',
+    )
+
+
+def _start_stage(number: int, starts: int) -> str:
+    return f'start {number + 1} of {starts}'
+
+
+def _without_stage(k: int, throws: int) -> str:
+    """Return the name of the stage that fits without throw `k`."""
+    return f'without throw {k + 1} of {throws}'
 
 
 def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, FloatArray]:
@@ -241,7 +264,7 @@ def _from_starts(problem: Problem, x: FloatArray, search: _Search) -> Solution:
                 most_steps=_START_STEPS,
                 best=search.best,
                 progress=search.progress,
-                stage=f'start {number + 1} of {search.starts}',
+                stage=_start_stage(number, search.starts),
             )
         )
     return min(solutions, key=lambda solution: solution.cost)
@@ -259,7 +282,7 @@ def _without_each(
     x, cost = solution.x, solution.cost
     for k in range(n if n > 1 else 0):
         rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
-        stage = f'without throw {k + 1} of {n}'
+        stage = _without_stage(k, n)
         shared = solve(
             replace(rest, margin=ROUGH),
             np.delete(x, np.r_[problem.own(k)]),
@@ -298,22 +321,26 @@ def _identifiable(
         place = [NAMES[i] for i in problem.free].index(worst.name)
         problem = replace(problem, free=information.without(problem, [worst.name]))
         x = np.delete(x, place)
-    if not problem.free and left_out:
-        raise ConfigError('throws', len(problem.throws), f'{left_out[0].reason}; nothing to fit')
     return problem, x, left_out
 
 
 def _noise(problem: Problem, x: FloatArray, given: set[str]) -> dict[str, float]:
-    """Return the noise of each instrument whose noise was not given, from the residuals."""
+    """Return the noise of each instrument whose noise was not given, from the residuals.
+
+    Residuals of a fit are smaller than the noise, because its parameters follow some of it.
+    """
     by_kind: dict[str, list[FloatArray]] = {}
+    fitted = information.information(problem, x).fitted
     for k, throw in enumerate(problem.throws):
         here = problem.here(k, x)[np.newaxis]
         for o, r in zip(throw.observations, problem.predictions(k, here), strict=True):
             by_kind.setdefault(o.kind, []).append(r.ravel())
+    count = sum(len(r) for every in by_kind.values() for r in every)
+    factor = _NORMAL * math.sqrt(count / max(count - fitted, 1.0))
     return {
         kind: problem.noise[kind]
         if kind in given
-        else max(_NORMAL * float(np.median(np.abs(np.concatenate(r)))), 1e-9)
+        else max(factor * float(np.median(np.abs(np.concatenate(r)))), 1e-9)
         for kind, r in by_kind.items()
     }
 

@@ -58,6 +58,11 @@ class Information:
     priors: FloatArray
     widening: float
 
+    @property
+    def fitted(self) -> float:
+        """Return how many parameters the measurements determine, rather than the priors."""
+        return float(np.trace(self.data @ _inverse(self.data + self.priors)))
+
     def covariance(self) -> FloatArray:
         """Return the covariance of the parameters, shape (p, p)."""
         return _inverse(self.data / self.widening**2 + self.priors)

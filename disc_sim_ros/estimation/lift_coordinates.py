@@ -88,7 +88,7 @@ def moved(
     flow = _air_velocity(states, rows)
     C_Lift = (lift + deltas[:, 6]) / _dynamic(setup, flow) - rows[:, AT['lift_offset']]
     new_alpha = np.clip(curve.angle(C_Lift), -1.5, 1.5)
-    axis = _axis(flow, new_alpha, bank + deltas[:, 7])
+    axis = axis_in_flow(flow, new_alpha, bank + deltas[:, 7])
     states[:, 6:10] = _turned_to(states[:, 6:10], local.disc_axis(old)[0], axis)
     return states
 
@@ -107,10 +107,11 @@ def _dynamic(setup: Setup, flow: FloatArray) -> FloatArray:
 
 def _frame(flow: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return unit vectors along the flow, to the right and down."""
-    speed = np.sqrt(np.sum(flow**2, axis=1))
-    forward = flow / np.maximum(speed, 1e-9)[:, None]
-    level = np.maximum(np.hypot(forward[:, 0], forward[:, 1]), 1e-6)
-    right = np.stack([-forward[:, 1] / level, forward[:, 0] / level, np.zeros(len(flow))], axis=1)
+    speed = np.sqrt(np.sum(flow**2, axis=-1))
+    forward = flow / np.maximum(speed, 1e-9)[..., None]
+    x, y = forward[..., 0], forward[..., 1]
+    level = np.maximum(np.hypot(x, y), 1e-6)
+    right = np.stack([-y / level, x / level, np.zeros_like(x)], axis=-1)
     return forward, right, np.cross(forward, right)
 
 
@@ -122,13 +123,25 @@ def _angles(states: FloatArray, flow: FloatArray) -> tuple[FloatArray, FloatArra
     return alpha, bank
 
 
-def _axis(flow: FloatArray, alpha: FloatArray, bank: FloatArray) -> FloatArray:
+def axis_in_flow(
+    flow: FloatArray, alpha: FloatArray | float, bank: FloatArray | float
+) -> FloatArray:
+    """Return the axis of a disc, through its underside, with an angle of attack and a bank.
+
+    Args:
+        flow: Velocity through the air, earth axes 1 [m/s], shape (..., 3).
+        alpha: Angle of attack, air on the underside positive [rad], shape (...).
+        bank: About the flow, right edge down positive [rad], shape (...).
+
+    Returns:
+        Unit vectors in earth axes 1, shape (..., 3).
+    """
     forward, right, down = _frame(flow)
     c = np.cos(alpha)
     axis: FloatArray = (
-        forward * np.sin(alpha)[:, None]
-        + down * (c * np.cos(bank))[:, None]
-        - right * (c * np.sin(bank))[:, None]
+        forward * np.asarray(np.sin(alpha))[..., None]
+        + down * np.asarray(c * np.cos(bank))[..., None]
+        - right * np.asarray(c * np.sin(bank))[..., None]
     )
     return axis
 

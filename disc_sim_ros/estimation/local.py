@@ -11,7 +11,6 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.kernels.equations import State
 
 NAMES = ('X', 'Y', 'Z', 'VX', 'VY', 'VZ', 'tilt_x', 'tilt_y', 'p', 'q', 'r')
-UNITS = ('m', 'm', 'm', 'm/s', 'm/s', 'm/s', 'rad', 'rad', 'rad/s', 'rad/s', 'rad/s')
 SIZE = len(NAMES)
 _FIRST = State._fields.index('e0')
 _ATTITUDE = slice(_FIRST, _FIRST + 4)
@@ -69,6 +68,16 @@ def disc_axis(states: FloatArray) -> FloatArray:
         ],
         axis=-1,
     )
+
+
+def attitude(down: FloatArray) -> FloatArray:
+    """Return the smallest turn that takes z to the direction `down`, a quaternion, shape (4,)."""
+    X, Y, Z = down / max(float(np.linalg.norm(down)), 1e-12)
+    if Z < -1.0 + 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    e = np.array([1.0 + Z, -Y, X, 0.0])
+    unit: FloatArray = e / np.linalg.norm(e)
+    return unit
 
 
 def difference(a: FloatArray, b: FloatArray) -> tuple[FloatArray, float]:

@@ -79,8 +79,8 @@ def _observation(
             return Positions(t, paper_from_map(values))
         case 'camera':
             if instruments.camera_height is None:
-                allowed = 'positions without z_m are those of a camera: give --camera-height'
-                raise ConfigError('throws', name, allowed)
+                allowed = f'throw {name} has no z_m, so a camera drew it: give the height of that'
+                raise ConfigError('camera_height', None, allowed, 'camera_height')
             points = paper_from_map(np.pad(values, ((0, 0), (0, 1))))[:, :2]
             return Camera(t, points, instruments.camera_height)
         case 'attitude':

@@ -20,8 +20,8 @@ MOST_MEASUREMENTS = 600  # of one throw; of more, every second of the older half
 STEP = 0.02  # s; without nutation within 26 mm, 0.2 mm in the median (docs/predictor.md)
 MODEL = 'precession'  # nutation cannot be followed over a flight: its phase is lost
 # Factor of the covariance of a landing where no attitude was measured. The profile finds too
-# little of the curved range of winds and attitudes that fit. Nine of ten landings of 50 throws lay
-# in the ellipse with this factor, 76 % without (docs/predictor.md).
+# little of the curved range of winds and attitudes that fit. With this factor nine of ten landings
+# of about 40 throws lay in the ellipse, without it 76 % (docs/predictor.md).
 WITHOUT_ATTITUDE = 2.0
 MORE = 4  # Gauss-Newton steps before a throw is taken to have ended
 _ORDER = 1e-9  # s between two measurements

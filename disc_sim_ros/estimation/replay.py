@@ -1,7 +1,6 @@
 """Recorded measurements through the predictor, as if they came in now."""
 
 from collections.abc import Iterable, Sequence
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,12 +8,10 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation import throw_csv
 from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
-from disc_sim_ros.files import reason
 from disc_sim_ros.physics.frames import paper_quaternion, rotation_matrix
 
-POSITION_COLUMNS = ('t_s', 'x_m', 'y_m', 'z_m')
-ATTITUDE_COLUMNS = ('qx', 'qy', 'qz', 'qw')
 ELLIPSE_PERIOD = 0.05  # s of measurements between two profiled ellipses
 _SHORTEST_QUATERNION = 1e-6
 
@@ -61,8 +58,18 @@ class FollowedThrow:
         return self.predictions[known[-1]] if len(known) else None
 
 
-def replay(measurements: Iterable[Measurement], config: PredictorConfig) -> list[FollowedThrow]:
-    """Return the predictions of every throw in a series of measurements."""
+def replay(
+    recordings: Iterable[Iterable[Measurement]], config: PredictorConfig
+) -> list[FollowedThrow]:
+    """Return the predictions of every throw in recordings, each with a clock of its own."""
+    throws = [of for measurements in recordings for of in _replayed(measurements, config)]
+    return [FollowedThrow(number, tuple(of)) for number, of in enumerate(throws, 1)]
+
+
+def _replayed(
+    measurements: Iterable[Measurement], config: PredictorConfig
+) -> list[list[Prediction]]:
+    """Return the predictions of each throw in one series of measurements."""
     predictor = Predictor(config)
     throws: dict[int, list[Prediction]] = {}
     last_profile = -np.inf
@@ -73,7 +80,7 @@ def replay(measurements: Iterable[Measurement], config: PredictorConfig) -> list
         if prediction is not None:
             last_profile = m.time if profiled else last_profile
             throws.setdefault(prediction.throw, []).append(prediction)
-    return [FollowedThrow(number, tuple(of)) for number, of in throws.items()]
+    return list(throws.values())
 
 
 def measurements(
@@ -105,41 +112,25 @@ def _axis(quaternion: FloatArray) -> tuple[float, float, float] | None:
     return -float(down[0]), float(down[1]), float(down[2])
 
 
-def read_csv(path: Path) -> list[Measurement]:
-    """Return the measurements of a CSV file with the columns t_s, x_m, y_m, z_m.
-
-    With the columns qx, qy, qz, qw there is an attitude; empty fields are none.
+def read_csv(path: Path) -> list[list[Measurement]]:
+    """Return the measurements of each throw of a CSV file, see `throw_csv`.
 
     Raises:
-        ConfigError: The file cannot be read, or a column or a number is missing.
+        ConfigError: The file cannot be read, or has no positions.
     """
-    try:
-        with path.open(newline='', encoding='utf-8-sig') as file:
-            reader = csv.DictReader(line for line in file if not line.startswith('#'))
-            names = reader.fieldnames or []
-            rows = list(reader)
-    except OSError as error:
-        raise ConfigError('FILE', str(path), f'cannot read it ({reason(error)})') from None
-    except (UnicodeDecodeError, csv.Error):
-        raise ConfigError('FILE', str(path), 'not a text file with columns') from None
-    missing = [name for name in POSITION_COLUMNS if name not in names]
-    if missing:
-        allowed = f'needs the columns {", ".join(POSITION_COLUMNS)}, not {", ".join(names)}'
-        raise ConfigError('FILE', str(path), allowed)
-    table = np.array(
-        [[_number(path, i, row, n) for n in POSITION_COLUMNS] for i, row in enumerate(rows)]
-    )
+    return [_of_columns(path, columns) for columns in throw_csv.read(path, 'FILE').values()]
+
+
+def _of_columns(path: Path, columns: throw_csv.Columns) -> list[Measurement]:
+    """Return measurements at the times of the positions, with the attitudes of those times."""
+    if 'position' not in columns:
+        needed = ', '.join((throw_csv.TIME, *throw_csv.GROUPS['position']))
+        raise ConfigError('FILE', f'{path}: {", ".join(columns) or "nothing"}', f'give {needed}')
+    time, position = columns['position']
     quaternion = None
-    if all(name in names for name in ATTITUDE_COLUMNS):
-        quaternion = np.array([[float(row[n] or 0.0) for n in ATTITUDE_COLUMNS] for row in rows])
-    if not len(table):
-        raise ConfigError('FILE', str(path), 'it has no rows')
-    return measurements(table[:, 0], table[:, 1:], quaternion)
-
-
-def _number(path: Path, row: int, fields: dict[str, str], name: str) -> float:
-    try:
-        return float(fields[name])
-    except (TypeError, ValueError):
-        thing = f'{path}: row {row + 1}, {name}'
-        raise ConfigError(thing, fields[name], 'give a number') from None
+    if 'attitude' in columns:
+        quaternion = np.zeros((len(time), 4))
+        at, attitudes = columns['attitude']
+        _, places, rows = np.intersect1d(time, at, return_indices=True)
+        quaternion[places] = attitudes[rows]
+    return measurements(time, position, quaternion)

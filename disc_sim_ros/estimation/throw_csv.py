@@ -35,11 +35,12 @@ _MOST_ROWS = 1_000_000
 Columns = Mapping[str, tuple[FloatArray, FloatArray]]  # times (n,) and values (n, d) by instrument
 
 
-def read(path: Path | str) -> dict[str, Columns]:
+def read(path: Path | str, thing: str = 'THROWS') -> dict[str, Columns]:
     """Return the measurements of each throw of a file, by the name of the throw.
 
     Args:
         path: The file.
+        thing: What the file is to the user, for errors.
 
     Returns:
         For each throw the times [s] and values of each instrument that has any: 'position' (map),
@@ -54,25 +55,25 @@ def read(path: Path | str) -> dict[str, Columns]:
         text = Path(path).expanduser().read_text(encoding='utf-8-sig')
     except (OSError, ValueError) as error:
         why = reason(error) if isinstance(error, OSError) else 'it is no text in UTF-8'
-        raise ConfigError('throws', name, f'cannot read it ({why})') from None
+        raise ConfigError(thing, name, f'cannot read it ({why})') from None
     lines = [
         (number, line)
         for number, line in enumerate(text.splitlines(), 1)
         if line.strip() and not line.startswith('#')
     ]
     if len(lines) > _MOST_ROWS:
-        raise ConfigError('throws', f'{name}: {len(lines)} rows', f'at most {_MOST_ROWS} rows')
+        raise ConfigError(thing, f'{name}: {len(lines)} rows', f'at most {_MOST_ROWS} rows')
     if not lines:
-        raise ConfigError('throws', name, 'the file is empty')
+        raise ConfigError(thing, name, 'the file is empty')
     head = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
-    instruments = _instruments(name, head)
+    instruments = _instruments(thing, name, head)
     at = {column: place for place, column in enumerate(head)}
     rows: dict[str, dict[str, list[list[float]]]] = {}
     for number, line in lines[1:]:
         cells = [cell.strip() for cell in next(csv.reader([line]))]
         if len(cells) != len(head):
             where = f'{name}: line {number}: {len(cells)} cells'
-            raise ConfigError('throws', where, f'the head of the file has {len(head)}')
+            raise ConfigError(thing, where, f'the head of the file has {len(head)}')
         throw = cells[at[THROW]] if THROW in at else Path(name).stem
         of = rows.setdefault(throw, {})
         for instrument, columns in instruments.items():
@@ -84,7 +85,7 @@ def read(path: Path | str) -> dict[str, Columns]:
                 ]
                 of.setdefault(instrument, []).append(numbers)
     if not rows:
-        raise ConfigError('throws', name, 'no row has a measurement')
+        raise ConfigError(thing, name, 'no row has a measurement')
     arrays = {
         throw: {kind: np.array(numbers) for kind, numbers in of.items()}
         for throw, of in rows.items()
@@ -95,20 +96,18 @@ def read(path: Path | str) -> dict[str, Columns]:
     }
 
 
-def _instruments(name: str, head: list[str]) -> dict[str, tuple[str, ...]]:
+def _instruments(thing: str, name: str, head: list[str]) -> dict[str, tuple[str, ...]]:
     """Return the columns of the instruments that a file has."""
     if TIME not in head:
-        raise ConfigError(
-            'throws', f'{name}: {", ".join(head)}', f'name the columns, {TIME} first'
-        )
+        raise ConfigError(thing, f'{name}: {", ".join(head)}', f'name the columns, {TIME} first')
     if len(set(head)) < len(head):
-        raise ConfigError('throws', f'{name}: {", ".join(head)}', 'name each column once')
+        raise ConfigError(thing, f'{name}: {", ".join(head)}', 'name each column once')
     instruments = {kind: columns for kind, columns in GROUPS.items() if set(columns) <= set(head)}
     if 'position' not in instruments and set(CAMERA_COLUMNS) <= set(head):
         instruments['camera'] = CAMERA_COLUMNS
     if not instruments:
         groups = '; '.join(', '.join(columns) for columns in GROUPS.values())
-        raise ConfigError('throws', f'{name}: {", ".join(head)}', f'give columns of {groups}')
+        raise ConfigError(thing, f'{name}: {", ".join(head)}', f'give columns of {groups}')
     return instruments
 
 

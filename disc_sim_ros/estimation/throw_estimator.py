@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation import lift_coordinates, local
 from disc_sim_ros.estimation.ellipse import linear_covariance, profiled_covariance
 from disc_sim_ros.estimation.throw_fit import (
     POSITION,
@@ -100,29 +101,15 @@ def first_estimate(model: Model, data: Measurements) -> Estimate:
     Its attitude is the median of those measured, else that of the prior.
     """
     velocity, position = straight(data.time, data.position)
-    forward = velocity / max(float(np.linalg.norm(velocity)), 1e-3)
     measured = data.axis[np.isfinite(data.axis).all(axis=1)]
     if len(measured):
         down = np.median(measured, axis=0)
     else:
-        level = np.array([-forward[1], forward[0], 0.0])
-        right = level / max(float(np.linalg.norm(level)), 1e-6)
         nose, bank = model.prior.nose.mean, model.prior.bank.mean
-        down = np.cross(forward, right) * math.cos(nose) * math.cos(bank)
-        down = down + forward * math.sin(nose) - right * math.sin(bank)
+        down = lift_coordinates.axis_in_flow(velocity, nose, bank)
     rate = model.prior.rate.mean
-    state = [*position, *velocity, *attitude(down), rate, rate, model.prior.spin.mean, 0.0]
+    state = [*position, *velocity, *local.attitude(down), rate, rate, model.prior.spin.mean, 0.0]
     return Estimate(np.array(state), model.means.copy())
-
-
-def attitude(down: FloatArray) -> FloatArray:
-    """Return the smallest turn that takes z to the direction `down`, a quaternion, shape (4,)."""
-    X, Y, Z = down / max(float(np.linalg.norm(down)), 1e-12)
-    if Z < -1.0 + 1e-9:
-        return np.array([0.0, 1.0, 0.0, 0.0])
-    e = np.array([1.0 + Z, -Y, X, 0.0])
-    unit: FloatArray = e / np.linalg.norm(e)
-    return unit
 
 
 def straight(time: FloatArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:

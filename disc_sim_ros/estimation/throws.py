@@ -10,6 +10,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import local
+from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
 from disc_sim_ros.estimation.observations import (
     ATTITUDE,
     CAMERA,
@@ -30,18 +31,7 @@ WIDE = np.array([2.0, 2.0, 2.0, 5.0, 5.0, 5.0, 0.5, 0.5, 5.0, 5.0, 20.0, 10.0])
 _SPEED, _SPEED_DEVIATION = 17.0, 4.0  # m/s, where neither a path nor a release is known
 _HEIGHT = 1.3  # m, of a release by hand
 _GAUGE = 1e-3  # deviation of what no instrument of the throw can tell
-_ADVANCE_RATIO = 0.5  # of an ordinary throw
-_RELEASE_FIELDS = (
-    'speed',
-    'pitch',
-    'roll',
-    'yaw',
-    'angle_of_attack',
-    'sideslip',
-    'spin',
-    'roll_rate',
-    'pitch_rate',
-)
+_ADVANCE_RATIO, _ANGLE_OF_ATTACK = 0.5, math.radians(5.0)  # of an ordinary throw
 _FIRST = 0.25  # s of a path from which position and velocity are guessed
 
 
@@ -96,8 +86,6 @@ def throw_of(
     observations: Sequence[Observation],
     disc: Disc,
     *,
-    release: Launch | None = None,
-    deviations: FloatArray | None = None,
     spin: float | None = None,
 ) -> Throw:
     """Return a throw whose first state is guessed from its measurements.
@@ -106,20 +94,12 @@ def throw_of(
         name: Its name in reports.
         observations: Its instruments.
         disc: Gives the size for a guess of the spin.
-        release: The measured release, if there is one; its position is the origin of `map`.
-        deviations: Standard deviations of the fields of `release`, see `release_information`.
         spin: Spin rate at the first state [rad/s]; None where only the measurements tell it.
 
     Raises:
         ConfigError: There are no measurements from which a release can be guessed.
     """
     of = {o.kind: o for o in observations}
-    if release is not None:
-        start = np.array(release.state())
-        information = (
-            np.diag(1.0 / WIDE) if deviations is None else release_information(release, deviations)
-        )
-        return Throw(name, tuple(observations), start, information)
     state = np.array(Launch(speed=_SPEED, pitch=8.0, spin=0.0, height=_HEIGHT).state())
     wide = WIDE.copy()
     gauges: list[str] = []
@@ -138,9 +118,9 @@ def throw_of(
             gauges.append('position and heading of the release are fixed: a gyro cannot tell them')
     speed = float(np.linalg.norm(state[3:6]))
     if isinstance(attitude := of.get(ATTITUDE), Attitudes):
-        state[6:10] = attitude_with(attitude.axis[0], state[3:6])
+        state[6:10] = local.attitude(attitude.axis[0])
     else:
-        state[6:10] = tilted(state[3:6], math.radians(5.0), 0.0)
+        state[6:10] = local.attitude(axis_in_flow(state[3:6], _ANGLE_OF_ATTACK, 0.0))
     known = spin is not None
     if isinstance(gyro := of.get(GYRO), Gyro):
         state[10:13] = gyro.pqr[0]  # for a spin angle of 0; `fitting` tries others
@@ -166,62 +146,3 @@ def _first_motion(t: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]
     n = max(int(np.searchsorted(t, t[0] + _FIRST)), min(len(t), 5))
     fitted = np.polynomial.polynomial.polyfit(t[:n], x[:n], min(2, n - 1))
     return fitted[0], fitted[1]
-
-
-def tilted(velocity: FloatArray, angle_of_attack: float, roll: float) -> FloatArray:
-    """Return the attitude of a disc with an angle of attack and a roll about its path.
-
-    Args:
-        velocity: In earth axes 1 [m/s], shape (3,).
-        angle_of_attack: Air on the underside positive [rad].
-        roll: About the path, right edge down positive [rad].
-
-    Returns:
-        Quaternion of the despun axes 2, x axis in the plane of path and disc axis, shape (4,).
-    """
-    x = velocity / max(float(np.linalg.norm(velocity)), 1e-9)
-    right = np.cross([0.0, 0.0, 1.0], x)
-    right /= max(float(np.linalg.norm(right)), 1e-9)
-    down = np.cross(x, right)
-    z = math.cos(roll) * down - math.sin(roll) * right
-    axis = math.cos(angle_of_attack) * z + math.sin(angle_of_attack) * x
-    return attitude_with(axis, velocity)
-
-
-def attitude_with(axis: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Return an attitude whose z axis is given and whose x axis lies along the velocity, (4,)."""
-    z = axis / np.linalg.norm(axis)
-    x = velocity - (velocity @ z) * z
-    if np.linalg.norm(x) < 1e-6:
-        x = np.cross([0.0, 1.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    return _quaternion(np.stack([x, np.cross(z, x), z], axis=1))
-
-
-def _quaternion(matrix: FloatArray) -> FloatArray:
-    """Return the unit quaternion, scalar first, of a rotation matrix from body to earth."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import
-
-    x, y, z, w = Rotation.from_matrix(matrix).as_quat()
-    return np.array([w, x, y, z])
-
-
-def release_information(release: Launch, deviations: FloatArray) -> FloatArray:
-    """Return the root of the inverse covariance of a measured release, shape (12, 12).
-
-    Args:
-        release: The release.
-        deviations: Standard deviations of speed [m/s], pitch, roll, yaw, angle of attack, sideslip
-            [degrees], spin, roll rate, pitch rate [rad/s] and of x, y, height [m]; shape (12,).
-    """
-    centre = np.array(release.state())
-    slopes = np.zeros((RELEASE_SIZE, 12))
-    for j, name in enumerate(_RELEASE_FIELDS):
-        h = 1e-4
-        moved = replace(release, **{name: getattr(release, name) + h})
-        slopes[: local.SIZE, j] = local.difference(centre, np.array(moved.state()))[0] / h
-    slopes[0, 9] = slopes[1, 10] = slopes[2, 11] = 1.0
-    covariance = (slopes * deviations**2) @ slopes.T
-    covariance += np.diag(np.full(RELEASE_SIZE, _GAUGE**2))  # spin angle, and what is not spanned
-    root: FloatArray = np.linalg.cholesky(np.linalg.inv(covariance)).T
-    return root

@@ -36,6 +36,17 @@ def test_csv_gives_the_landing_and_a_plot(csv, tmp_path, capsys):
     assert plot.read_bytes().startswith(b'\x89PNG')
 
 
+def test_each_throw_of_a_csv_has_its_own_clock(csv, tmp_path, capsys):
+    file, _ = csv
+    head, *rows = file.read_text().splitlines()
+    both = tmp_path / 'both.csv'
+    both.write_text('\n'.join([f'throw,{head}', *(f'{n},{row}' for n in 'ab' for row in rows)]))
+    assert predict.main([str(both), '--disc-uncertainty', '0', '--json']) == 0
+    first, second = json.loads(capsys.readouterr().out)['throws']
+    assert (first.pop('throw'), second.pop('throw')) == (1, 2)
+    assert first == second
+
+
 def test_bag_of_the_simulator_gives_its_landing(capsys):
     assert predict.main([str(SAMPLE), '--disc', 'frisbee', '--throw-spin', '31']) == 0
     first, *rest = capsys.readouterr().out.splitlines()
@@ -48,8 +59,9 @@ def test_bag_of_the_simulator_gives_its_landing(capsys):
     ('content', 'error'),
     [
         ('t_s,x_m,y_m\n0,0,0\n', 'z_m'),
-        ('t_s,x_m,y_m,z_m\n0,0,0,high\n', "row 1, z_m: 'high'"),
-        ('t_s,x_m,y_m,z_m\n', 'no rows'),
+        ('t_s,x_m,y_m,z_m\n0,0,0,high\n', "line 2: z_m: 'high'"),
+        ('t_s,x_m,y_m,z_m\n', 'no row'),
+        ('t_s,qx,qy,qz,qw\n0,0,0,0,1\n', 'give t_s, x_m, y_m, z_m'),
     ],
 )
 def test_bad_files_are_refused(tmp_path, capsys, content, error):

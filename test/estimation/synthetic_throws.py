@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 
+from disc_sim_ros.estimation import local
 from disc_sim_ros.estimation.predictor import Measurement, up_axis
 from disc_sim_ros.estimation.prior import ThrowPrior
-from disc_sim_ros.estimation.throw_estimator import attitude
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.physics.kernels.rows import AT
@@ -82,7 +82,7 @@ def _release(
     down = np.cross(forward, right) * math.cos(nose) * math.cos(bank)
     down = down + forward * math.sin(nose) - right * math.sin(bank)
     rates = [drawn(prior.rate), drawn(prior.rate), drawn(prior.spin)]
-    state = [0.0, 0.0, -1.3, *(speed * forward), *attitude(down), *rates, 0.0]
+    state = [0.0, 0.0, -1.3, *(speed * forward), *local.attitude(down), *rates, 0.0]
     row = default_row(setup)
     for name, g in prior.every_constant.items():
         row[AT[name]] = drawn(g)

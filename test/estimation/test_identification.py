@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import crossvalidation, report, synthetic
-from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
+from disc_sim_ros.estimation import crossvalidation, report
+from disc_sim_ros.estimation.coefficients import NAMES, base_of
 from disc_sim_ros.estimation.identification import identify
 from disc_sim_ros.estimation.observations import Positions
 from disc_sim_ros.estimation.throws import Throw, throw_of
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.launch import Launch
+from estimation import synthetic_sessions
 
 pytestmark = pytest.mark.xdist_group('identify')  # one fit for all
 
@@ -29,24 +31,9 @@ def true_values() -> np.ndarray:
 
 
 def session(count: int, kinds: tuple[str, ...], seed: int = 4) -> list[Throw]:
+    setup = replace(BASE, step=0.002, wind=Wind(mean=flip_yz((*WIND, 0.0))))
     generator = np.random.default_rng(seed)
-    disc = disc_with(base_of(BASE), true_values(), 'true', '')
-    setup = Setup(disc=disc, step=0.002, wind=Wind(mean=(WIND[0], -WIND[1], 0.0)))
-    throws = []
-    for k in range(count):
-        launch = Launch(
-            speed=generator.uniform(14.0, 20.0),
-            pitch=generator.uniform(5.0, 15.0),
-            roll=generator.uniform(-15.0, 15.0),
-            angle_of_attack=generator.uniform(0.0, 8.0),
-            spin=generator.uniform(45.0, 75.0),
-            height=1.3,
-            roll_rate=generator.normal(0.0, 2.0),
-            pitch_rate=generator.normal(0.0, 2.0),
-        )
-        made = synthetic.measured(launch, setup, kinds, generator, rate=60.0)
-        throws.append(throw_of(f'throw {k + 1}', made, disc))
-    return throws
+    return synthetic_sessions.session(true_values(), setup, kinds, generator, count=count)
 
 
 @pytest.fixture(scope='module')

@@ -1,11 +1,13 @@
-"""Simulated measurements of throws, for tests, examples and comparisons."""
+"""Simulated measurements of throws, and sessions of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import local
+from disc_sim_ros.estimation.coefficients import base_of, disc_with
 from disc_sim_ros.estimation.observations import (
     ACCELERATION,
     ATTITUDE,
@@ -20,6 +22,7 @@ from disc_sim_ros.estimation.observations import (
     Observation,
     Positions,
 )
+from disc_sim_ros.estimation.throws import Throw, throw_of
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.sampled import default_row, fly_sampled
@@ -103,3 +106,43 @@ def _shaken(axes: FloatArray, deviation: float, generator: np.random.Generator) 
     turned = axes + deviation * generator.standard_normal(axes.shape)
     unit: FloatArray = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
     return unit
+
+
+def session(
+    values: FloatArray,
+    setup: Setup,
+    kinds: Sequence[str],
+    generator: np.random.Generator,
+    *,
+    count: int,
+    spin_error: float | None = None,
+) -> list[Throw]:
+    """Return throws of one disc as instruments measure them.
+
+    Args:
+        values: Coefficients of the disc, in the order of `coefficients.NAMES`, shape (9,).
+        setup: The base disc, the wind and the step.
+        kinds: The instruments.
+        generator: Draws releases and noise.
+        count: Number of throws.
+        spin_error: Standard deviation of the spin that is told [rad/s]; None: no spin is told.
+    """
+    disc = disc_with(base_of(setup), values, 'true', '')
+    throws = []
+    for k in range(count):
+        launch = Launch(
+            speed=generator.uniform(14.0, 20.0),
+            pitch=generator.uniform(5.0, 15.0),
+            roll=generator.uniform(-15.0, 15.0),
+            angle_of_attack=generator.uniform(0.0, 8.0),
+            spin=generator.uniform(45.0, 75.0),
+            height=1.3,
+            roll_rate=generator.normal(0.0, 2.0),
+            pitch_rate=generator.normal(0.0, 2.0),
+        )
+        made = measured(launch, replace(setup, disc=disc), kinds, generator)
+        spin = None
+        if spin_error is not None:
+            spin = launch.spin + spin_error * generator.standard_normal()
+        throws.append(throw_of(f'throw {k + 1}', made, disc, spin=spin))
+    return throws
