@@ -18,7 +18,8 @@ from PIL import Image
 import browser
 from disc_sim_ros import Launch, Setup, Wind, fly, load_disc
 from disc_sim_ros.view.page import page
-from disc_sim_ros.view.shown import SYSTEMS, of_flight
+from disc_sim_ros.view.shown import of_flight
+from disc_sim_ros.view.system import SYSTEMS
 
 ROOT = Path(__file__).parents[1]
 RATE = 25.0  # pictures a second

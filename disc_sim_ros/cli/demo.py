@@ -253,7 +253,7 @@ def _page(bag: Path, page: Path, analyses: 'Sequence[Analysis]') -> Path | None:
     """Write the page of the flight; return None, after a note, if it cannot be written."""
     from disc_sim_ros.view.page import ViewerMissingError  # noqa: PLC0415
     from disc_sim_ros.view.page import page as page_of  # noqa: PLC0415
-    from disc_sim_ros.view.shown import SYSTEMS  # noqa: PLC0415
+    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
     try:
         content = page_of([pages.recorded(a) for a in analyses], bag.name, SYSTEMS['metric'])

@@ -206,8 +206,9 @@ def _without_samples(flown: flight.Flight) -> flight.Flight:
 
 def _write_page(chosen: argparse.Namespace, flown: dict[str, flight.Flight]) -> str:
     from disc_sim_ros.view import shown  # noqa: PLC0415 - only with --html or --view
+    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
-    system = shown.SYSTEMS[chosen.units]
+    system = SYSTEMS[chosen.units]
     flights = [shown.of_flight(f, name, system) for name, f in flown.items()]
     return pages.write(chosen, flights, f'Flight of {", ".join(flown)}', chosen.units)
 

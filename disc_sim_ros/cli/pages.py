@@ -77,14 +77,14 @@ def write(
         chosen: The flags.
         flights: The flights.
         title: Heading of the page.
-        units: A key of `view.shown.SYSTEMS`.
+        units: A key of `view.system.SYSTEMS`.
 
     Raises:
         ConfigError: The file cannot be written.
         ViewerMissingError: trimesh is missing.
     """
     from disc_sim_ros.view.page import page  # noqa: PLC0415 - only with these flags
-    from disc_sim_ros.view.shown import SYSTEMS  # noqa: PLC0415
+    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
     content = page(flights, title, SYSTEMS[units])
     name = getattr(chosen, 'html', None) or _new_name()

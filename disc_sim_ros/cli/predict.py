@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output
+from disc_sim_ros.cli import output, pages
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.estimation.replay import FollowedThrow
 
 WATCHED = (0.3, 0.5, 1.0, 1.5, 2.0)  # s, rows of the summary
+LEAST_MISS = 0.01  # m, lower end of the axis of the plot
 _FLAGS = {name: f'--{name.replace("_", "-")}' for name in PREDICTION}
 
 
@@ -58,6 +59,10 @@ def parser(prog: str = 'predict') -> Parser:
     )
     p.add_argument('--json', action='store_true', help='print one JSON document')
     output.add_plot(p)
+    pages.add_page(p)
+    p.add_argument(
+        '--units', choices=('metric', 'us'), default='metric', help='of the page: m or ft'
+    )
     return p
 
 
@@ -89,7 +94,24 @@ def _run(chosen: argparse.Namespace) -> int:
         output.show('\n\n'.join(_summary(throw) for throw in throws))
     if plot is not None:
         output.write_plot(plot, _figure(throws))
+    if pages.is_wanted(chosen):  # after the numbers: they come even if it cannot be written
+        line = _write_page(chosen, throws, config)
+        if chosen.json:
+            output.note(chosen.prog, line)
+        else:
+            output.show(line)
     return 0
+
+
+def _write_page(
+    chosen: argparse.Namespace, throws: 'Sequence[FollowedThrow]', config: 'PredictorConfig'
+) -> str:
+    from disc_sim_ros.cli.predict_page import shown_throw  # noqa: PLC0415
+    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
+
+    flights = [shown_throw(throw, config, SYSTEMS[chosen.units]) for throw in throws]
+    title = f'Landings predicted from {Path(chosen.source).resolve().name}'
+    return pages.write(chosen, flights, title, chosen.units)
 
 
 def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
@@ -192,6 +214,7 @@ def _figure(throws: 'Sequence[FollowedThrow]') -> 'Figure':
     """Return the miss of each throw over the time of watching."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.ticker import FuncFormatter  # noqa: PLC0415
 
     from disc_sim_ros.palette import COLOURS  # noqa: PLC0415
 
@@ -200,13 +223,16 @@ def _figure(throws: 'Sequence[FollowedThrow]') -> 'Figure':
     axis = figure.add_subplot()
     for i, throw in enumerate(throws):
         colour = COLOURS[i % len(COLOURS)]
-        axis.semilogy(throw.watched, throw.misses, color=colour, label=f'throw {throw.number}')
+        label = f'throw {throw.number}: miss of the predicted landing'
+        axis.semilogy(throw.watched, throw.misses, color=colour, label=label)
         sigma = [float(p.covariance[:2, :2].trace()) ** 0.5 for p in throw.predictions]
-        axis.semilogy(throw.watched, sigma, color=colour, ls=':')
-    axis.set(xlabel='watched, s', ylabel='miss of the predicted landing, m')
-    axis.set_title('dotted: standard deviation that the predictor states', fontsize=10)
+        label = f'throw {throw.number}: standard deviation that the predictor states'
+        axis.semilogy(throw.watched, sigma, color=colour, ls=':', label=label)
+    axis.set(xlabel='measured for, s', ylabel='distance on the ground, m')
+    axis.set_ylim(bottom=LEAST_MISS)  # the last miss is 0
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda metres, _: f'{metres:g}'))
     axis.grid(color='0.9')
-    axis.legend(loc='best')
+    axis.legend(loc='best', fontsize='small')
     return figure
 
 

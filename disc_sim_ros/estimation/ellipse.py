@@ -30,6 +30,7 @@ _SIDES = np.array([1.0, -1.0])
 _DIFFERENCE = 0.3  # of the derivatives, standard deviations
 _FRACTIONS = np.array([1.0, 0.5, 0.2, 0.0])  # of a Gauss-Newton step, tried at once
 _GRID = np.linspace(-5.0, 5.0, 201)
+_LEAST_VARIANCE = 1e-6  # m^2, of a landing that is shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,23 @@ class _Side:
     tangents: FloatArray
     cost: FloatArray
     landing: FloatArray
+
+
+def half_axes(covariance: FloatArray, share: float) -> tuple[float, float, float]:
+    """Return the ellipse that holds a share of normally distributed landings.
+
+    Args:
+        covariance: Of x and y [m], shape (2, 2).
+        share: Between 0 and 1.
+
+    Returns:
+        Half of the long and of the short axis [m], at least 1 mm standard deviation each, and the
+        direction of the long one from x towards y [rad].
+    """
+    variances, axes = np.linalg.eigh(covariance)
+    squared = -2.0 * math.log1p(-share)  # quantile of chi-squared with two degrees of freedom
+    short, long = (math.sqrt(max(float(v), _LEAST_VARIANCE) * squared) for v in variances)
+    return long, short, math.atan2(axes[1, 1], axes[0, 1])
 
 
 def linear_covariance(linear: Linear) -> FloatArray:

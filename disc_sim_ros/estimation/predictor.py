@@ -271,7 +271,8 @@ class Predictor:
         """
         begin = prediction.time - prediction.reference_time
         end = prediction.landing_time - prediction.reference_time
-        times = np.append(np.arange(begin, end, 1.0 / rate), end)
+        times = np.arange(begin, end, 1.0 / rate)
+        times = np.append(times[times < end], end)  # arange may go a rounding error too far
         flight = prediction.flight
         flown = fly_sampled(
             flight.state[None],

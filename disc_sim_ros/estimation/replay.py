@@ -1,7 +1,7 @@
 """Recorded measurements through the predictor, as if they came in now."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,8 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import throw_csv
 from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
-from disc_sim_ros.physics.frames import paper_quaternion, rotation_matrix
+from disc_sim_ros.physics.frames import paper_from_map, paper_quaternion, rotation_matrix
+from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 
 ELLIPSE_PERIOD = 0.05  # s of measurements between two profiled ellipses
 _SHORTEST_QUATERNION = 1e-6
@@ -22,11 +23,14 @@ class FollowedThrow:
 
     Attributes:
         number: From 1.
-        predictions: In the order of the measurements.
+        predictions: In the order of the measurements. Each has the covariance of the last profiled
+            ellipse, as `predictor_node` publishes it.
+        measurements: Those from the beginning of the throw to the last prediction.
     """
 
     number: int
     predictions: tuple[Prediction, ...]
+    measurements: tuple[Measurement, ...]
 
     @property
     def landing(self) -> FloatArray:
@@ -63,24 +67,53 @@ def replay(
 ) -> list[FollowedThrow]:
     """Return the predictions of every throw in recordings, each with a clock of its own."""
     throws = [of for measurements in recordings for of in _replayed(measurements, config)]
-    return [FollowedThrow(number, tuple(of)) for number, of in enumerate(throws, 1)]
+    return [FollowedThrow(number, *of) for number, of in enumerate(throws, 1)]
 
 
 def _replayed(
     measurements: Iterable[Measurement], config: PredictorConfig
-) -> list[list[Prediction]]:
-    """Return the predictions of each throw in one series of measurements."""
+) -> list[tuple[tuple[Prediction, ...], tuple[Measurement, ...]]]:
+    """Return predictions and measurements of each throw in one series of measurements."""
     predictor = Predictor(config)
     throws: dict[int, list[Prediction]] = {}
-    last_profile = -np.inf
+    every: list[Measurement] = []
+    last_profile, covariance = -np.inf, np.full((3, 3), np.nan)
     for m in measurements:
+        every.append(m)
         predictor.add(m)
         profiled = not last_profile <= m.time < last_profile + ELLIPSE_PERIOD
         prediction = predictor.update(profiled=profiled)
         if prediction is not None:
-            last_profile = m.time if profiled else last_profile
+            if profiled:
+                last_profile, covariance = m.time, prediction.covariance
+            prediction = replace(prediction, covariance=covariance)
             throws.setdefault(prediction.throw, []).append(prediction)
-    return list(throws.values())
+    return [
+        (tuple(of), tuple(m for m in every if of[0].reference_time <= m.time <= of[-1].time))
+        for of in throws.values()
+    ]
+
+
+def fitted_flight(throw: FollowedThrow, config: PredictorConfig, rate: float) -> Trajectory:
+    """Return the flight that fits all measurements of a throw, up to its landing.
+
+    Args:
+        throw: A throw of `replay`.
+        config: The configuration of that `replay`.
+        rate: Samples a second [Hz].
+
+    Returns:
+        The flight by the model of the predictor, which has no nutation, over the ground. Time 0 is
+        the first measurement; the wind is the estimated one.
+    """
+    last = throw.predictions[-1]
+    whole = replace(last, time=last.reference_time)
+    times, states = Predictor(config).path(whole, rate)
+    rows = np.empty((len(times), COLUMNS))
+    rows[:, 0] = times - last.reference_time
+    rows[:, 1:-3] = states
+    rows[:, -3:] = paper_from_map(np.array([*last.wind, -config.setup.wind.mean[2]]))
+    return Trajectory(rows, config.setup.disc.diameter)
 
 
 def measurements(

@@ -9,7 +9,9 @@ from typing import Any
 from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.quantities import LAUNCH
-from disc_sim_ros.view.shown import MOST_SAMPLES, ShownFlight, System, curve_labels, document
+from disc_sim_ros.view import predicted
+from disc_sim_ros.view.shown import MOST_SAMPLES, ShownFlight, curve_labels, document
+from disc_sim_ros.view.system import System
 
 TRIMESH = (5, 6)  # from and below: the page uses names of its viewer that are not promised
 MOST_SAMPLES_OF_PAGE = 24_000  # of all flights together: 5 MB
@@ -20,7 +22,15 @@ _POLICY = (
 )
 _BLACK = {'#000000': '#808080'}  # which a dark page would hide
 _LIVE_POLICY = f"{_POLICY} 'self'"  # and the server of the page
-_SCRIPTS = ('pose.js', 'scene.js', 'camera.js', 'curves.js', 'live.js', 'controls.js')
+_SCRIPTS = (
+    'pose.js',
+    'scene.js',
+    'camera.js',
+    'curves.js',
+    'predicted.js',
+    'live.js',
+    'controls.js',
+)
 # Of the page of a running simulator: least and greatest value, and step.
 _SLIDERS = {
     'speed': (5.0, 35.0, 0.5),
@@ -39,8 +49,11 @@ class ViewerMissingError(DiscSimError):
 def page(flights: Sequence[ShownFlight], title: str, system: System) -> bytes:
     """Return a page of flights as the bytes of an HTML file that needs no other file.
 
+    If the flights have predictions, it shows them beside the picture, and the miss as a curve.
+
     Args:
-        flights: The flights, at least one; they start together at time 0.
+        flights: The flights, at least one; they start together at time 0. All of them have
+            predictions, or none.
         title: Heading of the page.
         system: Units of all that people read.
 
@@ -55,6 +68,9 @@ def page(flights: Sequence[ShownFlight], title: str, system: System) -> bytes:
         'tracks': [document(flight, system, most) for flight in flights],
         'live': None,
     }
+    if all(flight.predictions is not None for flight in flights):
+        values['labels'] += [list(label) for label in predicted.curve_labels(system)]
+        values['camera'] = 'field'
     return assembled(viewer(), title, values).encode()
 
 
@@ -126,6 +142,7 @@ def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
 def _head(title: str, system: System) -> dict[str, Any]:
     return {
         'title': title,
+        'camera': 'follow',
         'units': {'length': system.length, 'speed': system.speed},
         'metresPerLength': 1.0 / system.lengths(1.0),
         'metresPerSecondPerSpeed': 1.0 / system.speeds(1.0),

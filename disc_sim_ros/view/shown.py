@@ -5,46 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight import Flight
 from disc_sim_ros.physics.trajectory import Trajectory
-from disc_sim_ros.units import UNITS
+from disc_sim_ros.view import predicted
+from disc_sim_ros.view.predicted import ShownPredictions
+from disc_sim_ros.view.rounding import plain
+from disc_sim_ros.view.system import System
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)  # the attitude of a disc that lies on the ground, heading +x
 MOST_SAMPLES = 6000  # of one flight in a page; longer ones are thinned out evenly
 # Digits behind the point: 0.1 mm, 1e-5 of a radian. They keep the page small.
 _PLACES = {'t': 4, 'position': 4, 'attitude': 6, 'spin': 4, 'wind': 3, 'curve': 4}
-
-
-@dataclass(frozen=True)
-class System:
-    """A system of units for people, by the names of `units.UNITS`.
-
-    Attributes:
-        length: Unit of heights and distances.
-        speed: Unit of speeds.
-        spin: Unit of spin rates.
-    """
-
-    length: str
-    speed: str
-    spin: str
-
-    def lengths(self, values: Any) -> Any:
-        """Return lengths [m] in this system."""
-        return values / UNITS['m'][self.length]
-
-    def speeds(self, values: Any) -> Any:
-        """Return speeds [m/s] in this system."""
-        return values / UNITS['m/s'][self.speed]
-
-    def spins(self, values: Any) -> Any:
-        """Return rates [rad/s] in this system."""
-        return values / UNITS['rad/s'][self.spin]
-
-
-SYSTEMS = {'metric': System('m', 'm/s', 'rad/s'), 'us': System('ft', 'mph', 'rpm')}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +29,7 @@ class ShownFlight:
         trajectory: The motion, in the paper's axes, at least one sample.
         landed: True if the last sample is on the ground.
         wind_is_known: False where the wind in the trajectory is not that of the flight.
+        predictions: What was predicted while it flew; None for a flight without a predictor.
     """
 
     name: str
@@ -64,6 +37,7 @@ class ShownFlight:
     trajectory: Trajectory
     landed: bool = True
     wind_is_known: bool = True
+    predictions: ShownPredictions | None = None
 
 
 def of_flight(flight: Flight, name: str, system: System) -> ShownFlight:
@@ -141,7 +115,7 @@ def thinned(trajectory: Trajectory, most: int = MOST_SAMPLES) -> Trajectory:
 
 
 def curve_labels(system: System) -> list[tuple[str, str]]:
-    """Return the names and units of the curves below the picture, in the order of `document`."""
+    """Return the names and units of the curves of a flight, in the order of `document`."""
     return [
         ('height', system.length),
         ('airspeed', system.speed),
@@ -158,7 +132,8 @@ def document(flight: ShownFlight, system: System, most: int = MOST_SAMPLES) -> d
     Positions [m] and quaternions x, y, z, w are those of `disc` in `map`, one after the other in
     flat lists. `spin` is the angle of `disc_body` in `disc` about z up [rad], not reduced to one
     turn, so that a page can interpolate it for any spin rate. Curves are in units of `system`;
-    null where a value does not exist. A longer flight is thinned to `most` samples.
+    null where a value does not exist. Those of predictions come last, see `predicted.curves`.
+    A longer flight is thinned to `most` samples.
     """
     t = thinned(flight.trajectory, most)
     up = frames.map_from_paper(t.position)
@@ -172,20 +147,20 @@ def document(flight: ShownFlight, system: System, most: int = MOST_SAMPLES) -> d
         euler[:, 1],
         euler[:, 0],
     )
-    return {
+    has_wind = flight.wind_is_known and bool(np.any(wind != 0.0))
+    values: dict[str, Any] = {
         'name': flight.name,
         'result': flight.result,
         'diameter': t.diameter,
         'landed': flight.landed,
-        't': _plain(t.t - t.t[0], 't'),
-        'position': _plain(up, 'position'),
-        'attitude': _plain(frames.message_quaternion(t.attitude), 'attitude'),
-        'spin': _plain(-np.asarray(t.spin_angle), 'spin'),
-        'wind': _plain(wind, 'wind') if flight.wind_is_known and np.any(wind != 0.0) else None,
-        'curves': [_plain(curve, 'curve') for curve in curves],
+        't': plain(t.t - t.t[0], _PLACES['t']),
+        'position': plain(up, _PLACES['position']),
+        'attitude': plain(frames.message_quaternion(t.attitude), _PLACES['attitude']),
+        'spin': plain(-np.asarray(t.spin_angle), _PLACES['spin']),
+        'wind': plain(wind, _PLACES['wind']) if has_wind else None,
+        'curves': [plain(curve, _PLACES['curve']) for curve in curves],
     }
-
-
-def _plain(values: FloatArray, kind: str) -> list[float | None]:
-    rounded = np.round(values, _PLACES[kind]).ravel() + 0.0
-    return [x if np.isfinite(x) else None for x in rounded.tolist()]
+    if flight.predictions is not None:
+        values['curves'] += predicted.curves(flight.predictions, t.t - t.t[0], system)
+        values['predictions'] = predicted.document(flight.predictions, most)
+    return values

@@ -12,13 +12,14 @@ from disc_sim_ros import Launch, Setup, Wind, fly, load_disc
 from disc_sim_ros.physics import frames
 from disc_sim_ros.view import shown
 from disc_sim_ros.view.page import page
+from disc_sim_ros.view.system import SYSTEMS
 
 pytest.importorskip('trimesh')
 pytestmark = [
     pytest.mark.skipif(browser.program() is None, reason=browser.MISSING),
     pytest.mark.xdist_group('browser'),
 ]
-METRIC = shown.SYSTEMS['metric']
+METRIC = SYSTEMS['metric']
 RATE = 200.0
 SIZES = {'desktop': (1100, 700, False), 'phone': (390, 844, True)}
 TWO_FRAMES = 'new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r())))'

@@ -15,10 +15,11 @@ from disc_sim_ros.physics import frames
 from disc_sim_ros.view import page as page_module
 from disc_sim_ros.view import shown
 from disc_sim_ros.view.page import ViewerMissingError, assembled, page
+from disc_sim_ros.view.system import SYSTEMS
 
 pytest.importorskip('trimesh')
 
-METRIC, US = shown.SYSTEMS['metric'], shown.SYSTEMS['us']
+METRIC, US = SYSTEMS['metric'], SYSTEMS['us']
 
 
 @pytest.fixture(scope='module')

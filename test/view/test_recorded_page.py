@@ -10,6 +10,7 @@ from disc_sim_ros import Launch, Setup, fly, load_disc
 from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.physics.trajectory import Trajectory
 from disc_sim_ros.view import shown
+from disc_sim_ros.view.system import SYSTEMS
 from view.test_page import data_of
 
 pytest.importorskip('trimesh')
@@ -61,7 +62,7 @@ def test_a_recording_may_lack_values(trajectory):
     rows[:, 7:14] = np.nan
     rows[:, 15:] = np.nan
     recorded = shown.of_recording(Trajectory(rows, 0.275), 'x', '', **KNOWN)
-    values = shown.document(recorded, shown.SYSTEMS['metric'])
+    values = shown.document(recorded, SYSTEMS['metric'])
     assert len(values['t']) == len(rows) - 1
     assert None not in values['position'] + values['attitude'] + values['spin']
     assert values['wind'] is None

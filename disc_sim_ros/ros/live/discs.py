@@ -19,7 +19,8 @@ from disc_sim_ros.physics.trajectory import quantities
 from disc_sim_ros.ros.internals import PolledSubscription
 from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS, NEWEST_QOS
 from disc_sim_ros.units import NANOSECONDS
-from disc_sim_ros.view.shown import LEVEL, System
+from disc_sim_ros.view.shown import LEVEL
+from disc_sim_ros.view.system import System
 
 RARELY = 6  # updates between two looks at topics that change little
 DIAMETER = 0.27  # m, of a disc whose configuration is not known

@@ -10,14 +10,14 @@ import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.ellipse import half_axes
 from disc_sim_ros.estimation.predictor import Prediction
 from disc_sim_ros.physics.frames import map_from_paper, odometry_array, rotation_matrix
 from disc_sim_ros.ros import messages
 from disc_sim_ros.topics import Frames
 from disc_sim_ros.units import NANOSECONDS
 
-# Quantiles of chi-squared with two degrees of freedom.
-SHARES = {50: 1.386, 90: 4.605}
+SHARES = (50, 90)  # percent of the landings in an ellipse
 _LOW = 0.02  # m, height of the ellipses over the ground
 _COLOURS = {50: (0.835, 0.369, 0.0, 0.6), 90: (0.835, 0.369, 0.0, 0.25)}
 _FLIP = np.diag(map_from_paper(np.ones(3)))
@@ -100,18 +100,16 @@ def wind(p: Prediction, stamp: int, frames: Frames) -> Vector3Stamped:
 
 def ellipses(p: Prediction, stamp: int, ground: float, frames: Frames) -> MarkerArray:
     """Return the ellipses that hold 50 and 90 % of the landings."""
-    variances, axes = np.linalg.eigh(p.covariance[:2, :2])
-    yaw = math.atan2(axes[1, 1], axes[0, 1])
     markers = []
-    for i, (share, quantile) in enumerate(SHARES.items()):
+    for i, share in enumerate(SHARES):
+        long, short, yaw = half_axes(p.covariance[:2, :2], share / 100.0)
         m = Marker(ns='landing', id=i, type=Marker.CYLINDER, action=Marker.ADD)
         _set(m.header, frames.map, stamp)
         m.lifetime.sec = _LIFETIME
         at = m.pose.position
         at.x, at.y, at.z = float(p.landing[0]), float(p.landing[1]), ground + _LOW
         m.pose.orientation.z, m.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
-        long, short = (2.0 * math.sqrt(max(v, 1e-6) * quantile) for v in variances[::-1])
-        m.scale.x, m.scale.y, m.scale.z = long, short, _LOW
+        m.scale.x, m.scale.y, m.scale.z = 2.0 * long, 2.0 * short, _LOW
         m.color.r, m.color.g, m.color.b, m.color.a = _COLOURS[share]
         markers.append(m)
     return MarkerArray(markers=markers)

@@ -11,7 +11,8 @@ function write() {
   }
   markTime(time, chosen);
   const wind = picture.ready && tracks[chosen].wind ? poseAt(tracks[chosen], time).wind : null;
-  const rows = page.labels.slice(0, 4).map(([name, unit], which) => `${number(curveAt(tracks[chosen], which, time))} ${unit}  ${name}`);
+  const row = ([name, unit], which) => `${number(curveAt(tracks[chosen], which, time))} ${unit}  ${name}`;
+  const rows = page.labels.map(row).filter((_, which) => which < 4 || which > 5); // pitch and roll are in the curves only
   if (wind) rows.push(`${number(Math.hypot(...wind) / page.metresPerSecondPerSpeed)} ${page.units.speed}  wind`);
   element('now').textContent = rows.join('\n');
 }
@@ -121,7 +122,7 @@ function start() {
   fit();
   steer(renderer.domElement, () => { stale = true; });
   picture.ready = true;
-  stale = true;
+  setCamera(page.camera);
   if (page.live || !matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
 }
 
@@ -137,6 +138,7 @@ function wait() {
 
 paint(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 listFlights();
+explainPredictions();
 connect();
 makeCurves(seek);
 if (page.live) {
@@ -156,6 +158,11 @@ window.discView = {
   throws() { document.querySelector('#throw button').click(); return document.querySelector('#throw > output').textContent; },
   duration, seek, play, choose, setCamera, setSize, paint,
   pose: (i = 0) => poseAt(tracks[i], time),
+  // What is drawn of the predictions of a flight: number of dots, place of the landing, half axes of the ellipse.
+  foretold(i = 0) {
+    const { dots, landing, edge } = picture.discs[i].foretold;
+    return { dots: dots.geometry.drawRange.count, visible: landing.visible, landing: landing.position.toArray().slice(0, 2), axes: edge.scale.toArray().slice(0, 2), yaw: edge.rotation.z };
+  },
   pixel(i = 0) {
     const at = picture.discs[i].body.position.clone().project(picture.camera), box = renderer.domElement.getBoundingClientRect();
     return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];

@@ -12,6 +12,7 @@ function extent() {
       high[i % 3] = Math.max(high[i % 3], value);
     });
   }
+  extendByLandings(low, high);
   if (page.live) [[-3, 30], [-8, 8], [0, 5]].forEach(([a, b], i) => { low[i] = Math.min(low[i], a); high[i] = Math.max(high[i], b); });
   low[2] = Math.min(low[2], 0);
   return { low, high, span: Math.max(...high.map((value, i) => value - low[i]), 1) };
@@ -147,11 +148,12 @@ function build() {
     all.add(made.body, made.shadow, made.plumb);
     return made;
   });
+  picture.discs.forEach(addPredictions);
   picture.arrow = arrow();
   picture.arrow.visible = false;
   all.add(picture.arrow);
   const plain = new Set(); // materials whose colours were given as seen on the screen
-  all.traverse(({ material }) => { if (material && (material.isLineBasicMaterial || material.isMeshBasicMaterial)) plain.add(material); });
+  all.traverse(({ material }) => { if (material && (material.isLineBasicMaterial || material.isMeshBasicMaterial || material.isPointsMaterial)) plain.add(material); });
   plain.forEach(material => material.color.convertSRGBToLinear());
   picture.discs.forEach(repath);
 }
@@ -176,12 +178,13 @@ function pose(now, chosen, late) {
     made.plumb.position.set(position[0], position[1], 0);
     made.plumb.scale.set(1, 1, position[2] || 1e-9);
     made.paths.forEach(({ flown, rest }, j) => {
-      flown.visible = (j === 1) === (eye.mode !== 'follow');
-      rest.visible = flown.visible && late === null;
+      rest.visible = (j === 1) === (eye.mode !== 'follow') && late === null;
+      flown.visible = (j === 1) === (eye.mode !== 'follow') && !made.foretold; // there, the dots show it
       const { segments, around, start, end } = flown.userData;
       const part = Math.min(1, Math.max(0, (time - start) / (end - start || 1)));
       flown.geometry.setDrawRange(0, Math.floor(part * segments) * around * 6);
     });
+    posePredictions(made, i, time, chosen);
     if (i !== chosen) return;
     const speed = wind ? Math.hypot(...wind) : 0;
     picture.arrow.visible = speed > 1e-3;
