@@ -59,11 +59,32 @@ def _thrown(disc: Disc) -> Iterator[Flight]:
 
 
 def _first(disc: Disc, names: tuple[str, ...], start: int, end: int | None) -> Event | None:
-    """Return the first event of these names from a start on and before an end [ns]."""
-    for event in disc.events:
-        if event.name in names and event.stamp >= start and (end is None or event.stamp < end):
+    """Return the first event of these names from a throw on, before the next throw.
+
+    Args:
+        disc: The disc.
+        names: Names of events.
+        start: Stamp of the throw [ns]; where time stood still, an event of the same stamp that
+            came before is of the flight before.
+        end: Stamp of the next throw or end [ns], or None.
+    """
+    first, last = _throw_at(disc, start), _throw_at(disc, end)
+    for i, event in enumerate(disc.events):
+        if event.name not in names or event.stamp < start or i < first:
+            continue
+        if end is None or event.stamp < end or (event.stamp == end and i < last):
             return event
     return None
+
+
+def _throw_at(disc: Disc, stamp: int | None) -> int:
+    """Return the place of the last throw with a stamp [ns] among the events, or -1."""
+    places = [
+        i
+        for i, event in enumerate(disc.events)
+        if event.name == FlightEvent.THROWN and event.stamp == stamp
+    ]
+    return places[-1] if places else -1
 
 
 def _moving(disc: Disc) -> Iterator[Flight]:

@@ -123,6 +123,31 @@ def odometry(s: State) -> Odometry:
     )
 
 
+def motion_in_map(s: State, acceleration: Vector, rates_change: Vector) -> FloatArray:
+    """Return velocities and accelerations of the disc in `map`, both linear and angular.
+
+    Args:
+        s: State.
+        acceleration: dV/dt of the centre over the ground, earth axes 1 [m/s^2].
+        rates_change: dp/dt, dq/dt, dr/dt in despun axes 2 [rad/s^2].
+
+    Returns:
+        Velocity [m/s], angular velocity with the spin [rad/s], acceleration [m/s^2] and angular
+        acceleration [rad/s^2], shape (4, 3).
+    """
+    e = s.e0, s.e1, s.e2, s.e3
+    p_dot, q_dot, r_dot = rates_change
+    # The despun axes turn at (p, q, 0): (p, q, 0) x (p, q, r) is (q r, -p r, 0).
+    turning = p_dot + s.q * s.r, q_dot - s.p * s.r, r_dot
+    vectors = (
+        (s.VX, s.VY, s.VZ),
+        earth_from_body(e, (s.p, s.q, s.r)),
+        acceleration,
+        earth_from_body(e, turning),
+    )
+    return map_from_paper(vectors) + 0.0
+
+
 def odometry_array(states: ArrayLike) -> FloatArray:
     """Return `odometry` of many states, equal to the last bit.
 
@@ -217,6 +242,12 @@ def rotation_matrix(e: ArrayLike) -> FloatArray:
 def earth_from_body(e: Quaternion, uvw: Vector) -> Vector:
     """Return the earth components of a vector in body axes, for one unit quaternion."""
     return rotated(rotation_elements(*e), uvw)
+
+
+def body_from_earth(e: Quaternion, vector: Vector) -> Vector:
+    """Return the body components of a vector in earth axes, for one unit quaternion."""
+    e0, e1, e2, e3 = e
+    return rotated(rotation_elements(e0, -e1, -e2, -e3), vector)
 
 
 def euler_from_quaternion(e: ArrayLike) -> FloatArray:

@@ -62,6 +62,7 @@ _POSITION = (POSITION, POSITION, POSITION)
 _SPEED = LAUNCH['speed']
 _VELOCITY = (VELOCITY, VELOCITY, VELOCITY)
 _RATES = (LAUNCH['roll_rate'], LAUNCH['pitch_rate'], LAUNCH['spin'])
+_ANY_RATES = (_RATES[2],) * 3  # about axes that are not those of the disc; the spin is fastest
 _UNIT_NORM = 1e-3  # largest deviation of a quaternion from length 1
 
 # The numbers in the order of the fields.
@@ -166,6 +167,46 @@ def release_from_odometry(message: Any, frames: Frames) -> State:
     VX, VY, VZ = paper_frames.earth_from_body(e, flip_yz(linear))
     p, q, r = flip_yz(angular)
     return State(X, Y, Z, VX, VY, VZ, *e, p, q, r, sigma=0.0)
+
+
+def pose_from_entity(message: Any, frames: Frames) -> tuple[Vector, Quaternion]:
+    """Return position [m] and attitude in the paper's axes, from a simulation_interfaces state.
+
+    Args:
+        message: simulation_interfaces/EntityState in `map`; an empty frame is `map`.
+        frames: Names of the frames.
+
+    Raises:
+        ConfigError: A number out of range, no unit quaternion, another frame.
+    """
+    _frame('state', message, (frames.map,), frames.map)
+    at = message.pose
+    position = flip_yz(_vector('state.pose.position', at.position, _POSITION))
+    return position, _attitude('state.pose.orientation', at.orientation)
+
+
+def twist_from_entity(message: Any, e: Quaternion, frames: Frames) -> tuple[Vector, Vector]:
+    """Return V in earth axes 1 [m/s] and p, q, r [rad/s], from a simulation_interfaces state.
+
+    Args:
+        message: simulation_interfaces/EntityState; its twist is in `map`, too.
+        e: Attitude of the disc.
+        frames: Names of the frames.
+
+    Raises:
+        ConfigError: A number out of range, another frame.
+    """
+    _frame('state', message, (frames.map,), frames.map)
+    thing = 'state.twist.linear'
+    linear = _vector(thing, message.twist.linear, _VELOCITY)
+    if math.hypot(*linear) > _SPEED.highest:
+        allowed = f'give a speed of at most {_SPEED.highest:g} {_SPEED.unit}'
+        raise ConfigError(thing, linear, allowed)
+    angular = _vector('state.twist.angular', message.twist.angular, _ANY_RATES)
+    rates = paper_frames.body_from_earth(e, flip_yz(angular))
+    for rate, quantity in zip(rates, _RATES, strict=True):
+        quantity.check(rate, f'state.twist.angular: {quantity.name}')
+    return flip_yz(linear), rates
 
 
 def _attitude(thing: str, orientation: Any) -> Quaternion:

@@ -92,3 +92,26 @@ def test_losses_are_those_of_the_recorder_and_of_others():
     noted = {f'{loss} /odom': '3' for loss in topics.Loss} | {'drops': '1'}
     rest = {'recorder': '/recorder_node', 'dropped /pose': '0', 'lost /tf': ''}
     assert bag_analysis.losses(noted | rest) == list(noted.items())
+
+
+def test_a_reset_without_time_between_ends_the_flight_before(tmp_path):
+    """While simulated time stands still, reset and throw have one stamp; their order counts."""
+    pytest.importorskip('rclpy')
+    from analysis.bags import Made
+    from disc_sim_ros.bags.writer import BagWriter
+
+    with BagWriter(tmp_path / 'bag') as writer:
+        made = Made(writer, publish_rate=10.0, physics_rate=1000.0)
+        made.go(0.5)
+        made.simulation.reset(rearm=True)
+        assert made.simulation.throw_due
+        made.simulation.publish()
+        made.simulation.publish_step()
+        made.go(0.5)
+    (disc,) = recording.discs(open_bag(tmp_path / 'bag'))
+    first, second = flights(disc)
+    assert first.ended == FlightEvent.RESET
+    assert second.ended == recording.END_OF_BAG
+    assert second.start == first.start + 400_000_000  # the first is thrown at the first message
+    verdicts = [resimulate.compare(f, resimulate.fly_again(f)) for f in (first, second)]
+    assert [(v.compared, v.identical) for v in verdicts] == [(4, 4), (6, 6)]

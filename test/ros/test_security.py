@@ -16,6 +16,7 @@ import pytest
 rclpy = pytest.importorskip('rclpy')
 
 from disc_sim_ros.ros.processes import started  # noqa: E402 - needs rclpy
+from disc_sim_ros.ros.sim.standard import offers  # noqa: E402 - needs rclpy
 from ros.sim_process import DEADLINE  # noqa: E402 - needs rclpy
 from security.policies import read_policy  # noqa: E402 - as above
 
@@ -41,11 +42,20 @@ def opened(node, name):
     return publish, subscribe
 
 
+def service_of(topic):
+    """Return the name of the service or action that a DDS topic is of."""
+    return topic[2:].removesuffix('Reply').removesuffix('Request').split('/_action')[0]
+
+
 def test_the_simulator_opens_what_its_policy_allows_and_nothing_else(ros):
     """A topic that the policy lacks stops the node from starting; one too many is a hole."""
     policy = read_policy('sim_node')
     ros.start({'publish_clock': True, 'auto_throw': False})
     optional = {'rt/tf', 'rt/clock', 'ros_discovery_info'}  # tf2_msgs, use_sim_time
+    if not offers.is_installed():
+        names = {f'/{offer.name}' for offer in offers.OFFERS}
+        allowed = policy.publish | policy.subscribe
+        optional |= {topic for topic in allowed if service_of(topic) in names}
     ros.spin_until(
         lambda: (
             policy.publish - optional <= opened(ros.node, 'sim_node')[0]

@@ -6,12 +6,18 @@ import xml.etree.ElementTree as ET
 
 POLICIES = Path(__file__).parents[2] / 'security/policies'
 GRAPH = 'ros_discovery_info'  # the topic of the ROS graph: every participant needs it
+_SERVICES = ('send_goal', 'cancel_goal', 'get_result')  # of an action
+_REQUESTS = tuple(f'rq{{}}/_action/{name}Request' for name in _SERVICES)
+_ANSWERS = tuple(f'rr{{}}/_action/{name}Reply' for name in _SERVICES)
+_REPORTS = ('rt{}/_action/feedback', 'rt{}/_action/status')
 # A permission of a policy as topics of DDS: patterns to publish and to subscribe to.
 TOPICS_OF = {
     ('topics', 'publish'): (('rt{}',), ()),
     ('topics', 'subscribe'): ((), ('rt{}',)),
     ('services', 'reply'): (('rr{}Reply',), ('rq{}Request',)),
     ('services', 'request'): (('rq{}Request',), ('rr{}Reply',)),
+    ('actions', 'execute'): (_ANSWERS + _REPORTS, _REQUESTS),
+    ('actions', 'call'): (_REQUESTS, _ANSWERS + _REPORTS),
 }
 
 

@@ -10,6 +10,13 @@ NAMES = sorted(path.stem for path in POLICIES.glob('*.xml'))
 ENCLAVES = {name: read_policy(name) for name in NAMES}
 COMMANDS = {'rt/cmd_moment', 'rt/cmd_coefficients', 'rt/throw', 'rt/wind'}
 SERVICES = {f'rq/sim_node/{name}Request' for name in ('throw', 'reset', 'pause', 'step')}
+SERVICES |= {  # of simulation_interfaces
+    f'rq/{name}Request'
+    for name in (
+        'set_simulation_state', 'reset_simulation', 'step_simulation', 'set_entity_state',
+        'simulate_steps/_action/send_goal',
+    )
+}  # fmt: skip
 SET_PARAMETERS = {
     f'rq/{node}/{name}Request'
     for node in ('sim_node', 'recorder_node')

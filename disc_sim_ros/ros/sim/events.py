@@ -38,7 +38,7 @@ def thrown(state: State, flight: int, source: str) -> Event:
     Args:
         state: State at the release.
         flight: Number of the flight.
-        source: What asked for the throw: 'launch' for the parameters, or the topic.
+        source: What asked for the throw: 'launch' for the parameters, or the topic or service.
     """
     speed = math.hypot(*state[3:6])
     values = {

@@ -5,10 +5,12 @@ from collections.abc import Callable
 from concurrent.futures import Future
 import threading
 import time
-from typing import Any
+from typing import Any, TypeVar
 
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics.flight_config import exact_seconds
+from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.physics.kernels.integrator import Observation
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import Commands
@@ -22,6 +24,8 @@ LONGEST_WAIT = 0.5  # s of wall time that a request waits for the next message
 LONGEST_QUANTUM = 1e-3  # s of simulated time between two polls of the command topics, at a pace
 UNWATCHED_QUANTUM = 5e-3  # s, the same while no publisher of commands and no clock is matched
 FAST_QUANTUM = 0.02  # s of simulated time, as fast as possible, where it takes almost no wall time
+LONGEST_BATCH = 0.02  # s of wall time for steps, until other requests have their turn
+_Result = TypeVar('_Result')
 _SLOWEST = 1e-9  # the pacer's real-time factor where there is no pace
 
 
@@ -34,6 +38,7 @@ class SimLoop(threading.Thread):
     Attributes:
         pacer: Lateness and slips.
         paused: Whether simulated time stands still.
+        stopped: Whether the disc waits at its start, paused, since `stop`.
     """
 
     def __init__(
@@ -61,7 +66,7 @@ class SimLoop(threading.Thread):
         """
         super().__init__(name='simulation')
         self.pacer = Pacer(config.setup.step, max(config.real_time_factor, _SLOWEST), 0.0)
-        self.paused = False
+        self.paused = self.stopped = False
         self._simulation = Simulation(config, publishers, commands, start, warn, inform=inform)
         self._publishers = publishers
         self._warn = warn
@@ -92,9 +97,9 @@ class SimLoop(threading.Thread):
         """Return the numbers of events so far."""
         return self._simulation.counts
 
-    def submit(self, action: Callable[[], str]) -> Future[str]:
+    def submit(self, action: Callable[[], _Result]) -> Future[_Result]:
         """Call `action` on the simulation thread, between two steps; return its future result."""
-        future: Future[str] = Future()
+        future: Future[_Result] = Future()
         self._requests.append((action, future))
         self._wake.set()
         return future
@@ -109,6 +114,7 @@ class SimLoop(threading.Thread):
     def throw(self) -> str:
         """Release the disc as configured; this ends a flight that is in the air."""
         self._keeping_pace(self._simulation.throw)
+        self.stopped = False
         if self.paused:
             self._simulation.publish()
         number = self._simulation.flight
@@ -129,8 +135,9 @@ class SimLoop(threading.Thread):
     def resume(self) -> str:
         """Let simulated time go on, from the wall clock if it follows that."""
         if self.paused:
-            self.paused = False
+            self.paused = self.stopped = False
             self._follow_wall('pause')
+            self._begin()
         return f'resumed at {exact_seconds(self.clock.now)} s'
 
     def step(self) -> str:
@@ -141,9 +148,80 @@ class SimLoop(threading.Thread):
         """
         if not self.paused:
             raise ConfigError('~/step', 'a running simulation', 'pause it first by ~/pause')
+        self._step()
+        return f'stepped to {exact_seconds(self.clock.now)} s'
+
+    def steps(self, most: int) -> int:
+        """Advance by some messages while paused, until `LONGEST_BATCH` of wall time is over.
+
+        Args:
+            most: Messages at most, 1 or more.
+
+        Returns:
+            The number of messages, at least 1.
+
+        Raises:
+            ConfigError: The simulation is not paused.
+        """
+        if not self.paused or self.stopped:
+            state = 'stopped' if self.stopped else 'running'
+            raise ConfigError('steps', f'a {state} simulation', 'pause it first')
+        end, done = time.monotonic() + LONGEST_BATCH, 0
+        while done < most:
+            self._step()
+            done += 1
+            if time.monotonic() >= end:
+                break
+        return done
+
+    def restart(self) -> None:
+        """Begin again as after the start; with `auto_throw` the disc flies once time goes on."""
+        self._keeping_pace(lambda: self._simulation.reset(rearm=True))
+        if self.paused:
+            self._simulation.publish()
+
+    def stop(self) -> None:
+        """Pause and begin again as after the start."""
+        self.paused = True
+        self.restart()
+        self.stopped = True
+
+    def snapshot(self) -> tuple[int, State, Observation]:
+        """Return the present stamp [ns], the state, and its rates of change."""
+        sim = self._simulation
+        return sim.clock.now, sim.state, sim.observe()
+
+    def place(self, state: State, *, release: bool, source: str) -> None:
+        """Put the disc into a state.
+
+        Args:
+            state: The state.
+            release: Fly on from there; otherwise the disc is held there, unless it is in the air.
+            source: What asked for it.
+
+        Raises:
+            ConfigError: The state is too fast for the step, or underground.
+        """
+        sim = self._simulation
+        if release or sim.flying:
+            self._keeping_pace(lambda: sim.throw(state, source))
+        else:
+            sim.hold(state)
+        self.stopped = False
+        if self.paused:
+            sim.publish()
+
+    def _begin(self) -> None:
+        """Throw before time goes on, if a throw is due since a reset."""
+        if self._simulation.throw_due:
+            self._publish_step(serve=False)
+
+    def _step(self) -> None:
+        """Advance to the next message."""
+        self.stopped = False
+        self._begin()
         self._simulation.poll()
         self._advance(self._simulation.config.steps_per_publish, serve=False)
-        return f'stepped to {exact_seconds(self.clock.now)} s'
 
     def configure(self, config: SimConfig) -> str:
         """Take changed parameters: wind and pace at once, the rest at the next throw."""

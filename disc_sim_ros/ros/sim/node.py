@@ -1,6 +1,7 @@
 """`sim_node`: the disc in real time on ROS 2."""
 
 from collections.abc import Callable, Sequence
+import math
 import sys
 import time
 from typing import Any
@@ -24,6 +25,7 @@ from disc_sim_ros.ros.sim.loop import SimLoop
 from disc_sim_ros.ros.sim.parameters import TABLE
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.services import create_services
+from disc_sim_ros.ros.sim.standard.services import offer_standard_services
 from disc_sim_ros.ros.sinks import PublisherSinkFactory
 from disc_sim_ros.units import NANOSECONDS
 
@@ -58,6 +60,7 @@ class SimNode(Node):
             inform=self._inform,
         )
         create_services(self, self.loop)
+        self._standard = offer_standard_services(self, self.loop, frames)
         parameters.refuse_unused(self)
         self.add_pre_set_parameters_callback(lambda new: parameters.widened(new, TABLE))
         self.add_on_set_parameters_callback(self._on_set)
@@ -81,8 +84,9 @@ class SimNode(Node):
 
     @property
     def is_working(self) -> bool:
-        """Return True while the simulation thread runs."""
-        return self.loop.is_alive()
+        """Return True while the simulation thread runs, and no client has asked to quit."""
+        end = math.inf if self._standard is None else self._standard.end
+        return self.loop.is_alive() and time.monotonic() < end
 
     def stop(self) -> str:
         """End the simulation thread and wait for it; return nothing to say.

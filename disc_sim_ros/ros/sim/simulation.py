@@ -14,6 +14,7 @@ from disc_sim_ros.physics.flight_config import (
     exact_seconds,
 )
 from disc_sim_ros.physics.kernels.equations import State, Velocity
+from disc_sim_ros.physics.kernels.integrator import Observation
 from disc_sim_ros.physics.simulator import NOTHING, FlightSimulator
 from disc_sim_ros.ros import messages
 from disc_sim_ros.ros.sim import events
@@ -104,6 +105,20 @@ class Simulation:
         return self._throw_at < math.inf or bool(self.commands.throw.waiting)
 
     @property
+    def throw_due(self) -> bool:
+        """Return True if a throw with the configured launch is due."""
+        return self.clock.now >= self._throw_at
+
+    @property
+    def state(self) -> State:
+        """Return the present state."""
+        return self._resting if self._sim is None else self._sim.state
+
+    def observe(self) -> Observation:
+        """Return the present rates of change and loads; zeros for a disc at rest."""
+        return NOTHING if self._sim is None else self._sim.observe()
+
+    @property
     def steps_to_message(self) -> int:
         """Return the steps to the next message: a whole period where one is due now."""
         every = self.config.steps_per_publish
@@ -160,8 +175,8 @@ class Simulation:
         now = self.clock.now
         release = pop_due(self.commands.throw, now)
         if release is not None:
-            self.throw(release)
-        elif now >= self._throw_at:
+            self._throw_commanded(release)
+        elif self.throw_due:
             self.throw()
         self.publish()
 
@@ -184,8 +199,16 @@ class Simulation:
 
     # ---- throws ----
 
-    def throw(self, release: State | None = None) -> None:
-        """Release the disc, from the configured launch or from a commanded state."""
+    def throw(self, release: State | None = None, source: str = 'launch') -> None:
+        """Release the disc, from the configured launch or from another state.
+
+        Args:
+            release: The state; None for the configured launch.
+            source: What asked for the throw, see `events.thrown`.
+
+        Raises:
+            ConfigError: The release is underground, or too fast for the step.
+        """
         self._take_config()
         config = self.config
         gusts = config.setup.wind
@@ -194,14 +217,7 @@ class Simulation:
         )
         setup = replace(config.setup, wind=wind)
         state = release or config.launch.state()
-        try:
-            sim = FlightSimulator(setup, state, ground=config.ground)
-        except ConfigError as error:
-            if release is None:
-                raise
-            self.commands.throw.drop_accepted(str(error))
-            self._warn(f'throw dropped: {error}', topics.THROW)
-            return
+        sim = FlightSimulator(setup, state, ground=config.ground)
         sim.take(self.inputs.active.control)
         self._sim = sim
         self._imu_errors = ImuErrors(config.imu, self.flight, config.publish_period)
@@ -223,17 +239,35 @@ class Simulation:
         self.publishers.publish_release(self._released, sim.state, text, setup.disc.diameter)
         self.inputs.publish_wind()
         self.inputs.publish_control()
-        source = 'launch' if release is None else topics.THROW
         event = events.thrown(sim.state, self.flight, source)
         self._publish_event(event)
         self._inform(f'flight {self.flight} thrown: {event.text}', event.name)
 
-    def reset(self) -> None:
-        """Put the disc at its launch, at rest; discard commands and count flights from 1 again."""
+    def _throw_commanded(self, release: State) -> None:
+        try:
+            self.throw(release, topics.THROW)
+        except ConfigError as error:
+            self.commands.throw.drop_accepted(str(error))
+            self._warn(f'throw dropped: {error}', topics.THROW)
+
+    def hold(self, state: State) -> None:
+        """Put the disc somewhere, at rest; a flight ends, and a throw that is due is off."""
+        self._sim = None
+        self._resting = at_rest(state)
+        if self.throw_due:
+            self._throw_at = math.inf
+        self.publish_markers()
+
+    def reset(self, *, rearm: bool = False) -> None:
+        """Put the disc at its launch, at rest; discard commands and count flights from 1 again.
+
+        Args:
+            rearm: Throw as soon as time goes on, if `auto_throw` says so, as after a start.
+        """
         self._take_config()
         self._sim = None
         self._resting = at_rest(self.config.launch.state())
-        self._throw_at = math.inf
+        self._throw_at = self.clock.now if rearm and self.config.auto_throw else math.inf
         self.flight = 0
         self.inputs.reset(self.config.setup.wind)
         self.publishers.clear_path()
@@ -300,14 +334,14 @@ class Simulation:
         """Publish the present state on the topics that have subscribers."""
         out, sim, now = self.publishers, self._sim, self.clock.now
         out.publish_clock(now)
-        s = self._resting if sim is None else sim.state
+        s = self.state
         out.publish_motion(now, s)
         if out.quantities_have_subscribers:
             wind = Velocity(*self.inputs.wind.mean) if sim is None else sim.wind
             diameter = self.config.setup.disc.diameter
             out.publish_quantities(messages.quantities(s, wind, diameter))
         if out.imu.has_subscribers or out.aero_wrench.has_subscribers:
-            observed = NOTHING if sim is None else sim.observe()
+            observed = self.observe()
             if out.aero_wrench.has_subscribers:
                 force, moment = frames.flip_yz(observed[6:9]), frames.flip_yz(observed[9:12])
                 out.publish_aero_wrench(now, (*force, *moment))

@@ -1,0 +1,1 @@
+"""The standard services of simulation_interfaces, where that package is installed."""
