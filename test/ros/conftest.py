@@ -1,6 +1,7 @@
 """Fixtures of the ROS tests: each test has a private context, in a domain of its own."""
 
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,9 @@ def ros_environment(monkeypatch, tmp_path) -> Iterator[int]:
         monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'ros_log'))
         profiles = Path(__file__).with_name('fast_dds.xml')
-        monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(profiles))
+        # Fast DDS 3, from Kilted on, warns of the old name.
+        name = 'FASTDDS' if int(version('rclpy').split('.')[0]) > 7 else 'FASTRTPS'
+        monkeypatch.setenv(f'{name}_DEFAULT_PROFILES_FILE', str(profiles))
         yield domain
 
 
