@@ -48,7 +48,7 @@ def session(
     generator = np.random.default_rng(seed)
     values = truth(generator)
     wind = generator.normal(0.0, 2.0, 2)
-    setup = replace(BASE, step=0.002, wind=Wind(mean=flip_yz((*wind, 0.0))))
+    setup = replace(BASE, step=5e-4, wind=Wind(mean=flip_yz((*wind, 0.0))))
     error = None if GYRO in kinds else SPIN_ERROR
     throws = synthetic_sessions.session(
         values, setup, kinds, generator, count=count, spin_error=error

@@ -220,9 +220,27 @@ IDENTIFICATION = _table(
         1e-3,
         1000.0,
         5.0,
-        'Standard error of the point under the camera, which is taken as the origin of map',
+        'Standard error of --camera-at',
     ),
+    Quantity('camera_x', 'm', -1e4, 1e4, 0.0, 'Point under the camera, in map'),
+    Quantity('camera_y', 'm', -1e4, 1e4, 0.0, 'Point under the camera, in map'),
     Quantity('wind_error', 'm/s', 1e-3, 30.0, 3.0, 'Standard error of --wind'),
+    Quantity('noise', '', 1e-9, 1e3, None, 'Standard error of an instrument'),
+    # Errors of measured releases: those that Giljarhus, Gooding and Njaerheim (2022) give for a
+    # disc with sensors.
+    Quantity('release_speed_error', 'm/s', 1e-3, 30.0, 0.6, 'Standard error of a measured speed'),
+    Quantity(
+        'release_angle_error',
+        'degrees',
+        1e-3,
+        60.0,
+        2.0,
+        'Standard error of a measured launch angle and nose angle',
+    ),
+    Quantity(
+        'release_hyzer_error', 'degrees', 1e-3, 60.0, 5.0, 'Standard error of a measured hyzer'
+    ),
+    Quantity('release_spin_error', 'rad/s', 1e-3, 100.0, 2.0, 'Standard error of a measured spin'),
     Quantity(
         'accelerometer_range',
         'm/s^2',

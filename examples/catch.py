@@ -19,6 +19,7 @@ import time
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 from std_srvs.srv import Trigger
@@ -130,7 +131,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not spin_until(node, lambda: node.is_down):
             print('catch: the disc did not land', file=sys.stderr)
             return 1
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ExternalShutdownException):
         return 130
     finally:
         node.destroy_node()

@@ -2,14 +2,11 @@
 
 import csv
 from dataclasses import dataclass
-import math
 from pathlib import Path
 
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.files import reason
-from disc_sim_ros.physics.disc import Disc
-from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.physics.thrower import THROWS, angles
+from disc_sim_ros.physics.thrower import THROWS, Release
 from disc_sim_ros.quantities import LAUNCH, THROWER
 from disc_sim_ros.units import UNITS
 from disc_sim_ros.validation import Quantity
@@ -26,35 +23,11 @@ class Throw:
 
     Attributes:
         name: Of the row: the number in the file, from 1, and the kind of throw.
-        speed: Over the ground [m/s].
-        spin: Clockwise from above positive [rad/s].
-        launch_angle, nose, hyzer: As of `thrower.angles` [degrees].
-        wobble: Angle between the axis of the disc and the axis about which it wobbles [degrees].
+        release: What the sensor measured; its heading is 0, because the sensor has no compass.
     """
 
     name: str
-    speed: float
-    spin: float
-    launch_angle: float
-    nose: float
-    hyzer: float
-    wobble: float = 0.0
-
-    def launch(self, disc: Disc, height: float) -> Launch:
-        """Return the release.
-
-        A free disc whose axis wobbles about its angular momentum by an angle has the transverse
-        rate (I_z / I_x) r tan(angle). Its direction at the release is not measured: it is put
-        into the roll rate.
-
-        Args:
-            disc: Gives the inertias.
-            height: Of the release above the ground [m], which is not measured.
-        """
-        ratio = disc.inertia_axial / disc.inertia_diametral
-        wobble = ratio * self.spin * math.tan(math.radians(self.wobble))
-        turned = angles(self.launch_angle, self.nose, self.hyzer, clockwise=self.spin >= 0.0)
-        return Launch(speed=self.speed, spin=self.spin, height=height, roll_rate=wobble, **turned)
+    release: Release
 
 
 def throws(path: Path | str) -> list[Throw]:
@@ -112,11 +85,13 @@ def _throw(row: dict[str, str], number: int, where: str, speed: str) -> Throw:
         spin = abs(spin) * THROWS[_TYPES[kind]]
     wobble = (row.get('wobbleAngle') or '').strip()
     return Throw(
-        name=f'{number} {kind}'.rstrip(),
-        speed=value(speed, LAUNCH['speed'], UNITS['m/s'][_SPEEDS[speed]]),
-        spin=spin,
-        launch_angle=value('launchAngle', THROWER['launch_angle']),
-        nose=value('noseAngle', THROWER['nose']),
-        hyzer=value('hyzerAngle', THROWER['hyzer']),
-        wobble=value('wobbleAngle', _WOBBLE) if wobble else 0.0,
+        f'{number} {kind}'.rstrip(),
+        Release(
+            speed=value(speed, LAUNCH['speed'], UNITS['m/s'][_SPEEDS[speed]]),
+            spin=spin,
+            launch_angle=value('launchAngle', THROWER['launch_angle']),
+            nose=value('noseAngle', THROWER['nose']),
+            hyzer=value('hyzerAngle', THROWER['hyzer']),
+            wobble=value('wobbleAngle', _WOBBLE) if wobble else 0.0,
+        ),
     )

@@ -177,7 +177,7 @@ def _compare(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
             flown[disc] = _fly(chosen, release, setup, rate)
         for throw in throws:
             name = f'{disc} {throw.name}' if len(discs) > 1 else throw.name
-            launch = throw.launch(setup.disc, chosen.height)
+            launch = throw.release.launch(setup.disc, chosen.height)
             flown[name] = _fly(chosen, launch, setup, rate)
     names, flights = list(flown), list(flown.values())
     if chosen.json:

@@ -26,9 +26,12 @@ from disc_sim_ros.quantities import COEFFICIENTS, IDENTIFICATION, LAUNCH, MEAN_W
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from disc_sim_ros.estimation.crossvalidation import LeftOut
     from disc_sim_ros.estimation.identification import Identification
     from disc_sim_ros.estimation.problem import Prior
+    from disc_sim_ros.estimation.releases import ReleaseErrors
     from disc_sim_ros.estimation.throws import Throw
+    from disc_sim_ros.physics.thrower import Release
 
 _USED = ('position', 'attitude', 'gyro')  # unless --use says otherwise
 _EVERY = 2.0  # s between two lines of progress
@@ -98,7 +101,31 @@ def parser(prog: str = 'identify') -> Parser:
         add_quantity(
             made, f'--{name.replace("_", "-")}', IDENTIFICATION[name], default=argparse.SUPPRESS
         )
+    add_components(
+        made,
+        '--camera-at',
+        [IDENTIFICATION['camera_x'], IDENTIFICATION['camera_y']],
+        ('X', 'Y'),
+        'point on the ground under the camera, in map',
+    )
     add_quantity(made, '--camera-error', IDENTIFICATION['camera_error'])
+    made.add_argument(
+        '--noise',
+        default=argparse.SUPPRESS,
+        metavar='NAME=NUMBER,...',
+        help='standard errors of instruments, such as camera=1: also for what the model cannot '
+        'follow (default: estimated from the residuals)',
+    )
+    made.add_argument(
+        '--techdisc',
+        type=path,
+        default=argparse.SUPPRESS,
+        metavar='FILE.csv',
+        help='measured releases, a row for each throw in their order; columns as for fly',
+    )
+    for field in ('speed', 'angle', 'hyzer', 'spin'):
+        name = f'release_{field}_error'
+        add_quantity(made, f'--{name.replace("_", "-")}', IDENTIFICATION[name])
     text = 'mean wind beforehand, in map axes'
     add_components(made, '--wind', list(MEAN_WIND.values())[:2], ('X', 'Y'), text)
     add_quantity(made, '--wind-error', IDENTIFICATION['wind_error'])
@@ -138,6 +165,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
         aero=getattr(chosen, 'aero', None),
         air=flags.air_of(chosen),
     )
+    noise = _noise(chosen)
     throws = _throws(chosen, setup)
     # Imported once the input is known to be right: they take a second.
     from disc_sim_ros.estimation import crossvalidation, identification, report  # noqa: PLC0415
@@ -153,12 +181,13 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
         setup,
         free=_listed(chosen, 'free'),
         prior=_prior(chosen),
+        noise=noise,
         anyway=chosen.anyway,
         starts=chosen.starts,
         seed=chosen.seed,
         progress=progress,
     )
-    misses: list[float | None] = []
+    misses: list[LeftOut] = []
     if not result.interrupted:
         misses = crossvalidation.left_out_misses(result, progress)
     if chosen.json:
@@ -182,7 +211,7 @@ def _check_outputs(chosen: argparse.Namespace) -> None:
 def _write_outputs(
     chosen: argparse.Namespace,
     result: 'Identification',
-    misses: Sequence[float | None],
+    misses: 'Sequence[LeftOut]',
     provenance: Sequence[str],
 ) -> None:
     """Write the report and the disc file that were asked for, and name them."""
@@ -237,6 +266,7 @@ def _prior(chosen: argparse.Namespace) -> 'Prior':
         np.array([COEFFICIENT_SPREAD[name] for name in NAMES]),
         wind=tuple(chosen.wind),
         wind_deviation=chosen.wind_error,
+        foot=tuple(chosen.camera_at),
         foot_deviation=chosen.camera_error,
     )
 
@@ -254,17 +284,61 @@ def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
     used = _listed(chosen, 'use') or list(_USED)
     for name in used:
         validation.choice('--use', name, GROUPS)
-    throws = []
+    measured: dict[str, dict] = {}  # type: ignore[type-arg]
     for source in chosen.throws:
-        measured = _read(source)
-        for name, columns in measured.items():
+        for name, columns in _read(source).items():
             full = name if len(chosen.throws) == 1 else f'{Path(source).name} {name}'
-            kept = {k: v for k, v in columns.items() if k in {*used, 'camera'}}
-            if not kept:
+            measured[full] = {k: v for k, v in columns.items() if k in {*used, 'camera'}}
+            if not measured[full]:
                 allowed = f'it has {", ".join(columns) or "nothing"}, --use {",".join(used)}'
                 raise ConfigError('throws', full, allowed)
-            throws.append(throw_from(full, kept, setup.disc, instruments))
-    return throws
+    releases = _releases(chosen, len(measured))
+    return [
+        throw_from(name, columns, setup.disc, instruments, release)
+        for (name, columns), release in zip(measured.items(), releases, strict=True)
+    ]
+
+
+def _releases(
+    chosen: argparse.Namespace, count: int
+) -> 'Sequence[tuple[Release, ReleaseErrors] | None]':
+    """Return the measured release of each throw with its errors, None without."""
+    if not hasattr(chosen, 'techdisc'):
+        return [None] * count
+    from disc_sim_ros.analysis import techdisc  # noqa: PLC0415
+    from disc_sim_ros.estimation.releases import ReleaseErrors  # noqa: PLC0415
+
+    rows = techdisc.throws(chosen.techdisc)
+    if len(rows) != count:
+        allowed = f'it has {len(rows)} releases, THROWS have {count} throws: give a row for each'
+        raise ConfigError('--techdisc', chosen.techdisc, allowed)
+    errors = ReleaseErrors(
+        speed=chosen.release_speed_error,
+        launch_angle=chosen.release_angle_error,
+        nose=chosen.release_angle_error,
+        hyzer=chosen.release_hyzer_error,
+        spin=chosen.release_spin_error,
+    )
+    return [(row.release, errors) for row in rows]
+
+
+def _noise(chosen: argparse.Namespace) -> dict[str, float]:
+    """Return the standard errors of `--noise` by instrument."""
+    from disc_sim_ros.estimation.observations import NOISE  # noqa: PLC0415
+
+    noise = {}
+    for word in _listed(chosen, 'noise') or []:
+        name, _, number = word.partition('=')
+        validation.choice('--noise', name, NOISE)
+        try:
+            value: float | str = float(number)
+        except ValueError:
+            value = number
+        try:
+            noise[name] = IDENTIFICATION['noise'].check(value)
+        except ConfigError as error:
+            raise ConfigError(f'--noise {name}', value, error.allowed) from None
+    return noise
 
 
 def _read(source: str) -> 'dict[str, dict]':  # type: ignore[type-arg]
@@ -296,7 +370,7 @@ def _provenance(chosen: argparse.Namespace, words: Sequence[str]) -> list[str]:
 
 
 def _write_report(
-    folder: Path, result: 'Identification', misses: Sequence[float | None], lines: Sequence[str]
+    folder: Path, result: 'Identification', misses: 'Sequence[LeftOut]', lines: Sequence[str]
 ) -> None:
     from disc_sim_ros.estimation import plots, report  # noqa: PLC0415
 

@@ -1,6 +1,6 @@
 """How well the disc of other throws predicts one: leave-one-throw-out."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,25 +15,35 @@ _FEWEST = 6  # samples in it
 _KNOWN = 1e-3  # deviation of a wind that other throws told [m/s]
 
 
-def left_out_misses(
-    result: Identification, progress: Progress | None = None
-) -> list[float | None]:
-    """Return by how much each throw is missed by a fit of the others [m].
+@dataclass(frozen=True)
+class LeftOut:
+    """How well the disc and the wind of the other throws predict the end of one.
 
-    Coefficients and wind are those of the other throws. The release of the throw is fitted to the
-    first 30 % of its samples; the miss is the horizontal distance of its last point.
+    Attributes:
+        from_path: Distance of its last point with a release that is fitted to the first 30 % of
+            its samples [m]; None for a throw without positions.
+        from_release: The same with the release as it was measured, and only the heading and the
+            place of the path [m]; None without a measured release.
+    """
+
+    from_path: float | None = None
+    from_release: float | None = None
+
+
+def left_out_misses(result: Identification, progress: Progress | None = None) -> list[LeftOut]:
+    """Return by how much each throw is missed by a fit of the others.
 
     Args:
         result: The identification with all throws.
         progress: Called with a stage of `stages`, a count and the cost.
 
     Returns:
-        A miss for each throw; None for one without positions, and for a throw that is alone.
+        The misses of each throw; none for a throw that is alone.
     """
     problem = result.problem
     n = len(problem.throws)
     if n < 2:
-        return [None]
+        return [LeftOut()]
     return [_miss(problem, result.x, k, progress) for k in range(n)]
 
 
@@ -46,11 +56,11 @@ def _stage(k: int, throws: int) -> str:
     return f'throw {k + 1} of {throws} from the others'
 
 
-def _miss(problem: Problem, x: FloatArray, k: int, progress: Progress | None) -> float | None:
+def _miss(problem: Problem, x: FloatArray, k: int, progress: Progress | None) -> LeftOut:
     throw = problem.throws[k]
     path = next((o for o in throw.observations if isinstance(o, Positions | Camera)), None)
     if path is None or len(path.t) * _WATCHED < _FEWEST:
-        return None
+        return LeftOut()
     rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
     stage = _stage(k, len(problem.throws))
     first = np.delete(x, np.r_[problem.own(k)])
@@ -69,11 +79,20 @@ def _miss(problem: Problem, x: FloatArray, k: int, progress: Progress | None) ->
     end = float(path.t[-1]) * _WATCHED
     watched = replace(throw, observations=tuple(_until(o, end) for o in throw.observations))
     begun = replace(problem, throws=(watched,), free=(), held=held, prior=prior)
-    release = solve(begun, np.concatenate([begun.means[: begun.shared], x[problem.own(k)]])).x
+    fitted = solve(begun, np.concatenate([begun.means[: begun.shared], x[problem.own(k)]])).x
     whole = replace(begun, throws=(throw,))
-    parts = whole.predictions(0, release[np.newaxis])
-    place = throw.observations.index(path)
-    return float(np.linalg.norm(parts[place][0, -1, :2]))
+    believed = np.concatenate([whole.means[: whole.shared], throw.believed])
+    return LeftOut(
+        _last_miss(whole, path, fitted),
+        _last_miss(whole, path, believed) if throw.has_release else None,
+    )
+
+
+def _last_miss(problem: Problem, path: Positions | Camera, x: FloatArray) -> float:
+    """Return the horizontal distance of the last point of a path [m]."""
+    place = problem.throws[0].observations.index(path)
+    residuals = problem.predictions(0, x[np.newaxis])[place]
+    return float(np.linalg.norm(residuals[0, -1, :2]))
 
 
 def _until(o: Observation, end: float) -> Observation:

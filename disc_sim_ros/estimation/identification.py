@@ -23,7 +23,7 @@ from disc_sim_ros.estimation.fitting import (
 )
 from disc_sim_ros.estimation.information import Unidentifiable
 from disc_sim_ros.estimation.observations import NOISE, UNITS
-from disc_sim_ros.estimation.problem import ROUGH, Prior, Problem
+from disc_sim_ros.estimation.problem import FINEST, ROUGH, Prior, Problem
 from disc_sim_ros.estimation.throws import Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.quantities import COEFFICIENT_SPREAD
@@ -178,13 +178,14 @@ def identify(
         problem, x = _without_each(problem, solution, progress)
         best = Best(x)
         given = set(noise or {})
-        for _ in range(_ROUNDS):
+        for number in range(_ROUNDS):
             estimated = _noise(problem, x, given)
             changed = max(abs(estimated[kind] / problem.noise[kind] - 1.0) for kind in estimated)
             _refuse_misfit(problem, estimated, given)
-            if changed < _SAME_NOISE:
+            if number > 0 and changed < _SAME_NOISE:
                 break
-            problem = replace(problem, noise={**problem.noise, **estimated})
+            noises = {**problem.noise, **estimated}
+            problem = replace(problem, margin=FINEST, noise=noises)
             best = Best(x)
             x = solve(problem, x, best=best, progress=progress, stage='noise').x
     except KeyboardInterrupt:

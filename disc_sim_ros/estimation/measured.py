@@ -15,10 +15,12 @@ from disc_sim_ros.estimation.observations import (
     Observation,
     Positions,
 )
+from disc_sim_ros.estimation.releases import ReleaseErrors
 from disc_sim_ros.estimation.throw_csv import Columns
 from disc_sim_ros.estimation.throws import Throw, throw_of
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.frames import paper_from_map
+from disc_sim_ros.physics.thrower import Release
 from disc_sim_ros.quantities import LAUNCH
 
 _FEWEST = 8  # samples of an instrument
@@ -45,7 +47,13 @@ class Instruments:
     spin: float | None = None
 
 
-def throw_from(name: str, columns: Columns, disc: Disc, instruments: Instruments) -> Throw:
+def throw_from(
+    name: str,
+    columns: Columns,
+    disc: Disc,
+    instruments: Instruments,
+    release: tuple[Release, ReleaseErrors] | None = None,
+) -> Throw:
     """Return a throw from what its instruments measured.
 
     Args:
@@ -53,6 +61,7 @@ def throw_from(name: str, columns: Columns, disc: Disc, instruments: Instruments
         columns: Times [s] and values in axes of messages, as `throw_csv.read` returns them.
         disc: The base disc.
         instruments: What is known of the instruments.
+        release: The measured release with its errors, if there is one.
 
     Raises:
         ConfigError: There are too few samples, times do not increase, units look wrong, or what
@@ -67,7 +76,7 @@ def throw_from(name: str, columns: Columns, disc: Disc, instruments: Instruments
         observations.append(_observation(name, kind, t - start, values, instruments))
     for o in observations:
         _check_motion(name, o)
-    return throw_of(name, observations, disc, spin=instruments.spin)
+    return throw_of(name, observations, disc, spin=instruments.spin, release=release)
 
 
 def _observation(

@@ -1,6 +1,7 @@
 """What an identification says: a table for a terminal, a disc file, a document for programs."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 import math
 from typing import Any
 
@@ -9,6 +10,7 @@ import yaml
 
 from disc_sim_ros.estimation import coefficients
 from disc_sim_ros.estimation.coefficients import NAMES
+from disc_sim_ros.estimation.crossvalidation import LeftOut
 from disc_sim_ros.estimation.identification import Identification
 from disc_sim_ros.estimation.observations import UNITS
 from disc_sim_ros.physics.disc import Disc
@@ -19,7 +21,7 @@ _GOOD = 0.1  # of the spread or of the value: what counts as known well
 _OFFSETS = {'C_L0': 'lift_offset', 'C_D0': 'drag_offset', 'C_M0': 'pitching_offset'}
 
 
-def text(result: Identification, left_out_misses: Sequence[float | None]) -> str:
+def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
     """Return the result for a terminal."""
     problem = result.problem
     base = result.base.values
@@ -50,12 +52,15 @@ def text(result: Identification, left_out_misses: Sequence[float | None]) -> str
             f'  residuals are correlated in time: something is not modelled; standard errors are '
             f'{result.widening:.1f} times those of white noise'
         )
-    for throw, miss in zip(problem.throws, left_out_misses, strict=False):
-        if miss is not None:
-            lines.append(f'  without {throw.name}: its last point is missed by {miss:.2f} m')
+    for throw, miss in zip(problem.throws, left_out, strict=False):
+        if miss.from_path is not None:
+            line = f'  without {throw.name}: its last point is missed by {miss.from_path:.2f} m'
+            if miss.from_release is not None:
+                line += f', from its measured release by {miss.from_release:.2f} m'
+            lines.append(line)
     for gauge in sorted({gauge for throw in problem.throws for gauge in throw.gauges}):
         lines.append(f'  {gauge}')
-    lines.append(f'  {verdict(result, left_out_misses)}')
+    lines.append(f'  {verdict(result, left_out)}')
     return '\n'.join(lines)
 
 
@@ -73,7 +78,7 @@ def _strongest(result: Identification) -> str:
     return f'{names[i]} and {names[j]} are correlated: {value:.3f}; together they are known better'
 
 
-def verdict(result: Identification, left_out_misses: Sequence[float | None]) -> str:
+def verdict(result: Identification, left_out: Sequence[LeftOut]) -> str:
     """Return what the result is worth, in words."""
     spread = result.problem.prior.coefficients
     known = [
@@ -85,7 +90,7 @@ def verdict(result: Identification, left_out_misses: Sequence[float | None]) -> 
         f'{len(known)} of {len(NAMES)} coefficients are known ten times better than before'
         + (f': {", ".join(known)}' if known else '')
     ]
-    misses = [miss for miss in left_out_misses if miss is not None]
+    misses = [miss.from_path for miss in left_out if miss.from_path is not None]
     if misses:
         words.append(f'a throw that was not used is missed by {np.mean(misses):.2f} m in the mean')
     if result.widening > 2.0:
@@ -126,7 +131,7 @@ def disc_file(result: Identification, name: str, provenance: Sequence[str]) -> s
     return '\n'.join(lines) + '\n' + body
 
 
-def document(result: Identification, left_out_misses: Sequence[float | None]) -> dict[str, Any]:
+def document(result: Identification, left_out: Sequence[LeftOut]) -> dict[str, Any]:
     """Return the result for programs: numbers in SI units, null where there is none."""
     problem = result.problem
     shared = list(zip(problem.names, result.x, result.shared_errors, strict=False))
@@ -153,9 +158,9 @@ def document(result: Identification, left_out_misses: Sequence[float | None]) ->
         'widening': result.widening,
         'left_out': [one.reason for one in result.left_out],
         'miss_without_m': {
-            throw.name: miss for throw, miss in zip(problem.throws, left_out_misses, strict=False)
+            throw.name: asdict(miss) for throw, miss in zip(problem.throws, left_out, strict=False)
         },
-        'verdict': verdict(result, left_out_misses),
+        'verdict': verdict(result, left_out),
     }
 
 

@@ -22,8 +22,10 @@ from disc_sim_ros.estimation.observations import (
     Observation,
     Positions,
 )
+from disc_sim_ros.estimation.releases import ReleaseErrors, release_covariance, release_state
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.thrower import Release
 
 RELEASE_SIZE = local.SIZE + 1  # local coordinates of the first state, and the spin angle
 # Standard deviations of the first state where only measurements tell it; wide beside instruments.
@@ -48,6 +50,7 @@ class Throw:
         believed: Mean of that belief, from `start` on in the same coordinates, shape (12,).
         gauges: What is fixed because no instrument tells it, for people.
         spin_known: Whether the sense of the spin is known.
+        has_release: Whether the release was measured.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Throw:
     believed: FloatArray = field(default_factory=lambda: np.zeros(RELEASE_SIZE))
     gauges: tuple[str, ...] = ()
     spin_known: bool = True
+    has_release: bool = False
 
     @cached_property
     def times(self) -> FloatArray:
@@ -87,6 +91,7 @@ def throw_of(
     disc: Disc,
     *,
     spin: float | None = None,
+    release: tuple[Release, ReleaseErrors] | None = None,
 ) -> Throw:
     """Return a throw whose first state is guessed from its measurements.
 
@@ -95,6 +100,8 @@ def throw_of(
         observations: Its instruments.
         disc: Gives the size for a guess of the spin.
         spin: Spin rate at the first state [rad/s]; None where only the measurements tell it.
+        release: The measured release with its errors, if there is one; its heading and its
+            position are those of the path.
 
     Raises:
         ConfigError: There are no measurements from which a release can be guessed.
@@ -131,13 +138,24 @@ def throw_of(
         state[12] = guess if spin is None else spin
         wide[10] = 0.4 * guess if spin is None else max(0.05 * abs(spin), 1.0)
         wide[11] = _GAUGE
+    root: FloatArray = np.diag(1.0 / wide)
+    if release is not None:
+        measured, errors = release
+        measured, state = release_state(measured, disc, state[:3], state[3:6])
+        covariance = np.diag(wide**2)
+        covariance[: local.SIZE, : local.SIZE] = release_covariance(
+            measured, disc, errors, wide[:3]
+        )
+        root = np.asarray(np.linalg.cholesky(np.linalg.inv(covariance)).T, dtype=float)
+        known = True
     return Throw(
         name,
         tuple(observations),
         state,
-        np.diag(1.0 / wide),
+        root,
         gauges=tuple(gauges),
         spin_known=known,
+        has_release=release is not None,
     )
 
 

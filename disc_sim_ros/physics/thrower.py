@@ -1,10 +1,13 @@
 """A release in the words of disc golf: launch, nose and hyzer angle, and the kind of throw."""
 
-from math import degrees
+from dataclasses import dataclass
+from math import degrees, radians, tan
 
 from disc_sim_ros.physics import frames
+from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.environment import Air
 from disc_sim_ros.physics.kernels.rotation import cos_sin_degrees
+from disc_sim_ros.physics.launch import Launch
 
 # Sense of the spin, seen from above: 1 clockwise. Right or left hand, backhand or forehand.
 THROWS = {'rhbh': 1, 'rhfh': -1, 'lhbh': -1, 'lhfh': 1}
@@ -16,6 +19,49 @@ _LAPSE = 0.0065  # K/m
 _R = 287.05287  # J/(kg K), dry air
 _EXPONENT = 9.80665 / (_R * _LAPSE)
 _ZERO_CELSIUS = 273.15  # K
+
+
+@dataclass(frozen=True, kw_only=True)
+class Release:
+    """A release as a thrower or a sensor in the disc gives it.
+
+    Attributes:
+        speed: Over the ground [m/s].
+        spin: Clockwise from above positive [rad/s].
+        launch_angle, nose, hyzer: As of `angles` [degrees].
+        wobble: Angle between the axis of the disc and the axis about which it wobbles [degrees].
+        heading: Of the velocity, right of +x [degrees].
+    """
+
+    speed: float
+    spin: float
+    launch_angle: float
+    nose: float
+    hyzer: float
+    wobble: float = 0.0
+    heading: float = 0.0
+
+    def launch(self, disc: Disc, height: float) -> Launch:
+        """Return the release as a launch.
+
+        A free disc whose axis wobbles about its angular momentum by an angle has the transverse
+        rate (I_z / I_x) r tan(angle). Its direction at the release is not measured: it is put
+        into the roll rate.
+
+        Args:
+            disc: Gives the inertias.
+            height: Of the release above the ground [m].
+        """
+        ratio = disc.inertia_axial / disc.inertia_diametral
+        wobble = ratio * self.spin * tan(radians(self.wobble))
+        turned = angles(
+            self.launch_angle,
+            self.nose,
+            self.hyzer,
+            yaw=self.heading,
+            clockwise=self.spin >= 0.0,
+        )
+        return Launch(speed=self.speed, spin=self.spin, height=height, roll_rate=wobble, **turned)
 
 
 def angles(

@@ -19,6 +19,8 @@ END = 30.0  # s for a process to end after its signal
 _MODULES = {
     'sim_node': 'disc_sim_ros.ros.sim',
     'recorder_node': 'disc_sim_ros.ros.recorder',
+    'predictor_node': 'disc_sim_ros.ros.predictor',
+    'policy_node': 'disc_sim_ros.ros.policy',
     'live_view': 'disc_sim_ros.ros.live',
 }
 
@@ -98,7 +100,7 @@ class Process:
         """Start it.
 
         Args:
-            program: 'sim_node', 'recorder_node' or 'live_view'.
+            program: A node of this package, such as 'sim_node'.
             parameters: Parameters of the node.
             folder: Folder for its parameter file and its log.
             arguments: More arguments for ROS, such as '-r' and '__ns:=/red'.

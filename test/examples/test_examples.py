@@ -26,6 +26,7 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
+from disc_sim_ros.ros.processes import started
 
 pytestmark = pytest.mark.ros
 
@@ -150,6 +151,33 @@ def test_steer_turns_the_flight_as_the_physics_computes(ros):
         # arrives about one step before or after the release, on a busy machine 10 ms after it.
         assert end == pytest.approx(flight.position[:2], abs=0.06)
     assert abs(ends[1][1] - ends[0][1]) > 1.0
+
+
+def test_a_robot_runs_to_the_predicted_landing_and_catches_the_disc(ros, tmp_path):
+    """The robot starts 8 m from the landing and runs 6 m/s: it is there only if it knows early."""
+    ros.start(
+        {
+            'disc': 'ultrastar',
+            'auto_throw': False,
+            'launch.speed': 17.0,
+            'launch.height': 1.3,
+            'launch.spin': 60.0,
+        }
+    )
+    measured = {'sources': 'odom', 'added_noise': 0.02}
+    with started('predictor_node', measured, tmp_path) as predictor:
+        launch = Launch(speed=17.0, height=1.3, spin=60.0)
+        X, Y, _ = fly(launch, Setup(disc=disc_file.load_disc('ultrastar'))).position
+        at = (X - 6.0, -Y - 5.0)  # in map
+        assert run('catch.py', '--at', *map(str, at)).endswith('caught\n')
+        predictor.end()
+
+
+def test_catch_reports_that_there_is_no_predictor(load, capsys):
+    module = load('catch.py')
+    module.PATIENCE = 0.5
+    assert module.main([]) == 1
+    assert 'no sim_node or no predictor_node' in capsys.readouterr().err
 
 
 def test_steer_reports_that_there_is_no_simulator(load, capsys):

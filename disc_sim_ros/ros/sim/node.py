@@ -17,6 +17,7 @@ from disc_sim_ros import topics
 from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.physics import simulator
 from disc_sim_ros.ros import node_main, parameters
+from disc_sim_ros.ros.line_limit import LineLimit
 from disc_sim_ros.ros.signals import exit_on_signal
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import SimConfig, configuration
@@ -31,6 +32,7 @@ from disc_sim_ros.units import NANOSECONDS
 
 DIAGNOSTIC_PERIOD = 1.0  # s
 WARNING_PERIOD = 1.0  # s, between two warnings about the same thing
+INFORMATION_BURST = 10  # lines about one kind of event that may follow one another at once
 
 
 class SimNode(Node):
@@ -49,7 +51,8 @@ class SimNode(Node):
         factory = PublisherSinkFactory(self)
         publishers = Publishers(factory, frames, with_clock=config.publish_clock)
         commands = Commands(self, frames)
-        self._silent_until: dict[str, float] = {}  # by what a warning is about, steady clock [s]
+        self._warnings: dict[str, LineLimit] = {}  # by what they are about
+        self._events: dict[str, LineLimit] = {}
         self.loop = SimLoop(
             config,
             publishers,
@@ -128,20 +131,15 @@ class SimNode(Node):
 
     def _warn(self, text: str, about: str) -> None:
         """Log a warning, at most one in WARNING_PERIOD `about` the same thing."""
-        if self._may_say(about):
-            self.get_logger().warning(text)
+        limit = self._warnings.setdefault(about, LineLimit(1, WARNING_PERIOD))
+        if line := limit.admit(text, time.monotonic()):
+            self.get_logger().warning(line)
 
     def _inform(self, text: str, about: str) -> None:
-        """Log what happens, at most once in WARNING_PERIOD `about` the same kind of event."""
-        if self._may_say(about):
-            self.get_logger().info(text)
-
-    def _may_say(self, about: str) -> bool:
-        now = time.monotonic()
-        if now < self._silent_until.get(about, 0.0):
-            return False
-        self._silent_until[about] = now + WARNING_PERIOD
-        return True
+        """Log what happens; a flood of events `about` the same thing is one line a period."""
+        limit = self._events.setdefault(about, LineLimit(INFORMATION_BURST, WARNING_PERIOD))
+        if line := limit.admit(text, time.monotonic()):
+            self.get_logger().info(line)
 
 
 def first_stamp(config: SimConfig, node: Node) -> int:
