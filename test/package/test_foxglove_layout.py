@@ -5,6 +5,7 @@ import json
 import math
 from pathlib import Path
 import re
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from visualization_msgs.msg import MarkerArray
 from disc_sim_ros import topics
 from disc_sim_ros.physics import frames as paper_frames
 from disc_sim_ros.physics.flight import fly
+from disc_sim_ros.ros.predictor import outputs
 from disc_sim_ros.ros.sim.config import configuration
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.topics import Frames
@@ -30,9 +32,12 @@ WIDEST, NARROWEST = (
     4.5,
     2.6,
 )  # width / height of the field, without and with a side bar
+PREDICTED = json.loads((ROOT / 'config/predictor_layout.json').read_text(encoding='utf-8'))
+# Of the views of the predictor, without and with a side bar.
+PREDICTED_WIDTHS = {'3D!field': (1.83, 1.5), '3D!above': (1.12, 0.93)}
 CLOSE_UP = 0.7  # width / height of the close-up, with a side bar
 NUMBER = {'double', 'float', 'int32', 'uint32', 'int64'}
-MODIFIERS = {'.@rad2deg': 180.0 / math.pi}
+MODIFIERS = {'.@rad2deg', '.@sqrt'}
 
 
 # ---- panels ----
@@ -104,10 +109,16 @@ def paths() -> list[str]:
 
 
 def slots(kind: type, names: list[str]) -> str:
-    """Return the type of a nested field of a message type."""
+    """Return the type of a nested field, or of an element of an array, of a message type."""
     for name in names[:-1]:
         kind = type(getattr(kind(), name))
-    return kind.get_fields_and_field_types()[names[-1]]
+    last, _, index = names[-1].partition('[')
+    declared = kind.get_fields_and_field_types()[last]
+    if not index:
+        return declared
+    element, _, size = declared.partition('[')
+    assert 0 <= int(index.rstrip(']')) < int(size.rstrip(']'))
+    return element
 
 
 def test_plots_and_gauges_show_numbers_of_existing_topics(kinds):
@@ -216,11 +227,81 @@ def test_the_disc_fills_the_close_up(aspect):
     assert np.ptp(screen[:, 0]) > 1.0  # half the width
 
 
+# ---- predictor ----
+
+
+@pytest.fixture(scope='module')
+def predictor_kinds(kinds) -> dict[str, type]:
+    """Return the types of the topics of the simulator and of those that the layout shows."""
+    made = {
+        topics.PredictorTopic.LANDING: outputs.landing,
+        topics.PredictorTopic.ELLIPSE: outputs.ellipses,
+        topics.PredictorTopic.PATH: outputs.path,
+        topics.PredictorTopic.ESTIMATE: outputs.estimate,
+    }
+    return kinds | {f'/{name}': get_type_hints(make)['return'] for name, make in made.items()}
+
+
+def test_the_layout_of_the_predictor_shows_path_landing_and_ellipse(predictor_kinds):
+    panels = PREDICTED['configById']
+    assert set(leaves(PREDICTED['layout'])) == set(panels)
+    expected = {
+        f'/{name}'
+        for name in (
+            topics.FIELD_MARKERS,
+            topics.PATH,
+            topics.PredictorTopic.PATH,
+            topics.PredictorTopic.ELLIPSE,
+        )
+    }
+    for name in PREDICTED_WIDTHS:
+        assert visible(panels[name]) == expected
+        shown_types = {predictor_kinds[topic] for topic in visible(panels[name])}
+        assert shown_types == {MarkerArray, PathMessage}
+
+
+def test_the_plots_of_the_predictor_show_numbers_of_existing_topics(predictor_kinds):
+    plots = [p for name, p in PREDICTED['configById'].items() if name.startswith('Plot!')]
+    values = [path['value'] for plot in plots for path in plot['paths']]
+    assert len(values) == 6
+    for value in values:
+        plain, modifier, _ = value.partition('.@')
+        assert not modifier or value[len(plain) :] in MODIFIERS
+        topic, *names = plain.split('.')
+        assert slots(predictor_kinds[topic], names) in NUMBER
+    # x and y of the covariance are the places 0 and 7 of 6 x 6 numbers, row by row.
+    assert sum('covariance[0]' in v or 'covariance[7]' in v for v in values) == 2
+
+
+@pytest.mark.parametrize('name', PREDICTED_WIDTHS)
+def test_the_views_of_the_predictor_show_the_whole_flight(flight, name):
+    flown = paper_frames.map_from_paper(flight.trajectory.position)
+    for aspect in PREDICTED_WIDTHS[name]:
+        screen = on_screen(PREDICTED['configById'][name], flown, aspect)
+        assert np.abs(screen).max() < 0.97
+        assert np.ptp(screen[:, 0]) > 0.8
+        assert (np.diff(screen[:, 0]) > 0).all()  # to the right
+
+
 # ---- page ----
 
 
+def test_both_viewers_know_the_titles():
+    """Lichtblick has a name of its own for titles, and ignores the conversion to degrees."""
+    for layout in (LAYOUT, PREDICTED):
+        for panel in layout['configById'].values():
+            title = panel['foxglovePanelTitle']
+            assert panel['lichtblickPanelTitle'] == title.replace('[deg]', '[rad]')
+
+
 def test_the_page_says_how_to_open_it():
-    for word in ('config/foxglove_layout.json', 'Lichtblick', 'Foxglove', 'tools/viewer/open.mjs'):
+    for word in (
+        'config/foxglove_layout.json',
+        'config/predictor_layout.json',
+        'Lichtblick',
+        'Foxglove',
+        'tools/viewer/open.mjs',
+    ):
         assert word in PAGE
     assert (ROOT / 'tools/viewer/open.mjs').exists()
     assert all(f'`{topic[1:]}`' in PAGE for panel in (FIELD, CLOSE) for topic in visible(panel))

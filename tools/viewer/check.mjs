@@ -21,7 +21,8 @@ Ends with 1 if a panel stays empty, or does not move with the time where it shou
   --size WxH        of the window in pixels (default 1600x1000)
   --colours SCHEME  light or dark (default light)
   --browser FILE    Chromium (default /usr/bin/chromium)
-  --modules FOLDER  where the viewer is installed (default node_modules beside this file)`;
+  --modules FOLDER  where the viewer is installed (default node_modules beside this file)
+  --web FOLDER      use the Lichtblick for the web in this folder instead (its index.html is there)`;
 const BROWSER_FLAGS = [
   '--headless=new',
   '--no-sandbox',
@@ -45,7 +46,7 @@ const STILL = /^Plot/; // plots show the whole flight at all times; only a line 
 
 let options;
 let panels; // ids of the layout
-let close; // id of the panel that follows the disc
+let close; // id of the panel that follows the disc; a layout may have none
 
 await run(async () => {
   options = given();
@@ -88,7 +89,7 @@ async function look(address, profile) {
       await seek(page, fraction);
       seen[`at ${fraction}`] = await picture(page, `at_${fraction}`);
     }
-    return { seen, frames: await play(page), errors };
+    return { seen, frames: close ? await play(page) : [], errors };
   } finally {
     await browser.close();
   }
@@ -182,9 +183,11 @@ function report(name, { seen, frames, errors }) {
     const good = Math.min(...counts) >= ENOUGH && (STILL.test(id) || moves >= MOVING);
     return [good, `${id}: ${counts.join(', ')} coloured pixels, ${percent(moves)} moves`];
   });
-  const turns = frames.slice(1).map((frame, i) => difference(frames[i], frame));
-  const text = `${close} while it plays: ${turns.map(percent).join(', ')} moves`;
-  lines.push([Math.min(...turns) >= MOVING, text]);
+  if (frames.length) {
+    const turns = frames.slice(1).map((frame, i) => difference(frames[i], frame));
+    const text = `${close} while it plays: ${turns.map(percent).join(', ')} moves`;
+    lines.push([Math.min(...turns) >= MOVING, text]);
+  }
   lines.push(...errors.map((error) => [false, error]));
   console.log(`${name}: ${times.join(', ')}`);
   for (const [good, line] of lines) console.log(`  ${good ? 'ok ' : 'BAD'} ${line}`);

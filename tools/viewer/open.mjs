@@ -12,7 +12,8 @@ a browser. Only this machine can reach it. Ctrl-C ends it.
   --port N          (default 8765)
   --layout FILE     (default config/foxglove_layout.json)
   --colours SCHEME  light, dark or system (default light)
-  --modules FOLDER  where the viewer is installed (default node_modules beside this file)`;
+  --modules FOLDER  where the viewer is installed (default node_modules beside this file)
+  --web FOLDER      use the Lichtblick for the web in this folder instead (its index.html is there)`;
 
 await run(async () => {
   const { values, positionals } = parseArgs({

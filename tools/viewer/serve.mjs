@@ -1,6 +1,6 @@
 // The viewer, a bag and a layout behind one address: what `open` and `check` have in common.
 
-import { createReadStream, existsSync, readdirSync, statSync } from 'node:fs';
+import { createReadStream, existsSync, readFileSync, readdirSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -22,6 +22,7 @@ export const OPTIONS = {
   layout: { type: 'string', default: LAYOUT },
   colours: { type: 'string', default: 'light' },
   modules: { type: 'string', default: MODULES },
+  web: { type: 'string' },
   help: { type: 'boolean', short: 'h' },
 };
 
@@ -40,30 +41,43 @@ export async function run(command) {
 }
 
 /** Serve a bag with a layout; return the server and the address to open in a browser. */
-export async function serve({ bag, layout, colours, modules, port = 0 }) {
-  if (!existsSync(path.join(modules, '@foxglove'))) {
+export async function serve({ bag, layout, colours, modules, web, port = 0 }) {
+  if (!web && !existsSync(path.join(modules, '@foxglove'))) {
     throw new UserError(`${modules}: the viewer is not installed; run npm install in ${HERE}`);
   }
   const recording = mcap(path.resolve(bag));
   const shown = file(path.resolve(layout));
-  const server = createServer(answer({
-    '/modules/': path.resolve(modules),
-    '/layout/': path.dirname(shown),
-    '/bag/': path.dirname(recording),
-    '/': HERE,
-  }));
+  const places = { '/bag/': path.dirname(recording) };
+  if (web) Object.assign(places, { '/': path.resolve(web) });
+  else {
+    Object.assign(places, {
+      '/modules/': path.resolve(modules),
+      '/layout/': path.dirname(shown),
+      '/': HERE,
+    });
+  }
+  const server = createServer(answer(places, web ? { '/': started(web, shown) } : {}));
   await new Promise((done, failed) => {
     server.on('error', failed);
     server.listen(port, '127.0.0.1', done);
   });
   const root = `http://127.0.0.1:${server.address().port}`;
-  const query = new URLSearchParams({
-    layout: path.basename(shown),
-    colours,
+  const data = {
     ds: 'remote-file',
     'ds.url': `${root}/bag/${encodeURIComponent(path.basename(recording))}`,
-  });
-  return { server, recording, layout: shown, address: `${root}/page.html?${query}` };
+  };
+  const own = web ? {} : { layout: path.basename(shown), colours };
+  const query = new URLSearchParams({ ...own, ...data });
+  const address = `${root}/${web ? '' : 'page.html'}?${query}`;
+  return { server, recording, layout: shown, address };
+}
+
+/** Return the first page of a Lichtblick for the web, with a layout as its default. */
+function started(web, layout) {
+  const page = readFileSync(file(path.join(web, 'index.html')), 'utf8');
+  const place = '/*LICHTBLICK_SUITE_DEFAULT_LAYOUT_PLACEHOLDER*/';
+  if (!page.includes(place)) throw new UserError(`${web}: no Lichtblick for the web`);
+  return page.replace(place, () => readFileSync(layout, 'utf8').replaceAll('<', '\\u003c'));
 }
 
 /** Return the file of a bag, or its first one if it is a folder. */
@@ -79,10 +93,14 @@ function file(name) {
   return name;
 }
 
-/** Return what answers requests: whole files and parts of them, from a folder for each prefix. */
-function answer(places) {
+/** Return what answers requests: pages, whole files and parts, from a folder for each prefix. */
+function answer(places, pages) {
   return (request, response) => {
     const { pathname } = new URL(request.url, 'http://127.0.0.1');
+    if (pathname in pages) {
+      response.writeHead(200, { 'Content-Type': KINDS['.html'] }).end(pages[pathname]);
+      return;
+    }
     const prefix = Object.keys(places).find((name) => pathname.startsWith(name));
     const rest = path.normalize(`/${decodeURIComponent(pathname.slice(prefix.length))}`);
     const name = path.join(places[prefix], rest);
