@@ -138,14 +138,18 @@ def measured(
     *,
     naive: bool = False,
     show: bool = True,
+    **environment: str,
 ) -> tuple[float, float, float, float]:
-    """Return CPU per cent, messages a second, real-time factor and lateness p99 [s]."""
+    """Return CPU per cent, messages a second, real-time factor and lateness p99 [s].
+
+    Variables of the environment are for the process of the node.
+    """
     arguments = (physics, publish, subscribed, command_rate, seconds)
     try:
-        used, rate, factor, p50, p99 = tried(*arguments, naive=naive)
+        used, rate, factor, p50, p99 = tried(*arguments, naive=naive, **environment)
     except TimeoutError as error:  # no result about their cost
         print(f'repeated, the processes did not discover each other: {error}')
-        used, rate, factor, p50, p99 = tried(*arguments, naive=naive)
+        used, rate, factor, p50, p99 = tried(*arguments, naive=naive, **environment)
     if show:
         print(f'{label:54s} {used:7.1f} {rate:8.0f} {factor:7.4f} '
               f'{p50 * 1e6:9.0f} {p99 * 1e6:9.0f}')  # fmt: skip
@@ -160,6 +164,7 @@ def tried(
     seconds: float,
     *,
     naive: bool,
+    **environment: str,
 ) -> tuple[float, float, float, float, float]:
     """Return CPU per cent, messages a second, real-time factor and lateness p50, p99 [s].
 
@@ -167,7 +172,7 @@ def tried(
         TimeoutError: The subscriber gets no message.
     """
     with ExitStack() as stack:
-        node = stack.enter_context(simulator(physics, publish, naive=naive))
+        node = stack.enter_context(simulator(physics, publish, naive=naive, **environment))
         subscriber = None
         if subscribed:
             subscriber = stack.enter_context(role('subscribe', *subscribed))
@@ -191,13 +196,15 @@ def tried(
 
 
 @contextmanager
-def simulator(physics: int, publish: int, *, naive: bool = False) -> Iterator[subprocess.Popen]:
+def simulator(
+    physics: int, publish: int, *, naive: bool = False, **environment: str
+) -> Iterator[subprocess.Popen]:
     """Run a node in a process of its own."""
     if naive:
         with role('naive', str(physics)) as process:
             yield process
         return
-    with started(physics, publish) as process:
+    with started(physics, publish, **environment) as process:
         yield process
 
 

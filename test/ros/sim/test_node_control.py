@@ -228,7 +228,7 @@ def test_parameters_are_listed_described_and_refused_as_a_whole(ros):
         ('launch.speed', 20.0, 'launch.height', -1.0): 'launch.height: -1 .* ground',
         ('wind.x', 3.0, 'disc', 'brick'): "disc: 'brick' .* frisbee",
         ('wind.x', 3.0, 'launch.speed', math.nan): 'launch.speed',
-        ('launch.speed', 20.0, 'launch.pitch', 'steep'): 'DOUBLE',
+        ('launch.speed', 20.0, 'launch.pitch', 'steep'): 'parameter type, expected',
         ('launch.speed', 20.0, 'launch.pitch', 181.0): 'launch.pitch',
         ('launch.speed', 20.0, 'start_time', 5.0): 'start_time',
         ('launch.speed', 20.0, 'launch.sped', 5.0): 'undeclared',
