@@ -94,6 +94,8 @@ def comparison_figure(flights: 'Sequence[Flight]', names: 'Sequence[str]') -> Fi
         axis.set_aspect('equal', adjustable='datalim')
         axis.grid(alpha=0.3)
     side.axhline(0.0, color='0.6', lw=0.8)
+    if any(flight.landed for flight in flights):
+        side.plot([], [], 'x', color='0.4', ms=9, mew=2, label='landing')
     side.legend(loc='best')
     return figure
 

@@ -15,7 +15,7 @@ import time
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__, files, validation
-from disc_sim_ros.cli import flags, output
+from disc_sim_ros.cli import flags, output, pages
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
@@ -145,7 +145,8 @@ def parser(prog: str = 'identify') -> Parser:
         type=path,
         default=argparse.SUPPRESS,
         metavar='DIR',
-        help='new folder for report.html with plots, and its numbers as report.json',
+        help='new folder for report.html with plots, throws.html with the fitted flights in 3D '
+        '(needs trimesh), and the numbers as report.json',
     )
     search.add_argument('--json', action='store_true', help='print one JSON document')
     return p
@@ -378,20 +379,45 @@ def _write_report(
     text = report.text(result, misses)
     document = json.dumps(report.document(result, misses), allow_nan=False, indent=1)
     pictures = '\n'.join(_picture(figure) for figure in figures if figure is not None)
+    throws = _page_of_throws(result)
+    link = '<p><a href="throws.html">The fitted flights in 3D</a></p>' if throws else ''
     escaped = html.escape('\n'.join([*lines, '', text]))
     page = (
         '<!doctype html><html lang="en"><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
         '<title>Identification of a disc</title>'
         '<style>body{font:16px sans-serif;max-width:60em;margin:1em auto;padding:0 1em}'
-        'img{max-width:100%;background:#fff}pre{overflow-x:auto}'
+        'img{max-width:100%;background:#fff}pre{white-space:pre-wrap}'
         ':root{color-scheme:light dark}</style>'
-        f'<h1>Identification of a disc</h1><pre>{escaped}</pre>{pictures}</html>'
+        f'<h1>Identification of a disc</h1><pre>{escaped}</pre>{link}{pictures}</html>'
     )
     with files.whole_folder('--report', folder) as made:
         made.mkdir()
         (made / 'report.html').write_text(page, encoding='utf-8')
         (made / 'report.json').write_text(document, encoding='utf-8')
+        if throws:
+            (made / 'throws.html').write_bytes(throws)
+
+
+def _page_of_throws(result: 'Identification') -> bytes:
+    """Return a page of the fitted flights; empty without the package for pages."""
+    from disc_sim_ros.view.page import ViewerMissingError, page  # noqa: PLC0415
+    from disc_sim_ros.view.shown import ShownFlight  # noqa: PLC0415
+    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
+
+    flights = [
+        ShownFlight(
+            throw.name,
+            f'fitted to {throw.times[-1]:.2f} s of measurements',
+            result.flight(k, pages.RATE),
+            landed=False,
+        )
+        for k, throw in enumerate(result.problem.throws)
+    ]
+    try:
+        return page(flights, 'Throws fitted by identify', SYSTEMS['metric'])
+    except ViewerMissingError:
+        return b''
 
 
 def _picture(figure: 'Figure') -> str:

@@ -26,6 +26,9 @@ from disc_sim_ros.estimation.observations import NOISE, UNITS
 from disc_sim_ros.estimation.problem import FINEST, ROUGH, Prior, Problem
 from disc_sim_ros.estimation.throws import Throw
 from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.frames import paper_from_map
+from disc_sim_ros.physics.sampled import fly_sampled
+from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import COEFFICIENT_SPREAD
 
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
@@ -101,6 +104,23 @@ class Identification:
     def parameters_of(self, k: int) -> FloatArray:
         """Return the shared parameters and the release of throw `k`, shape (1, shared + 12)."""
         return self.problem.here(k, self.x)[np.newaxis]
+
+    def flight(self, k: int, rate: float) -> Trajectory:
+        """Return the fitted flight of throw `k`, from its first to its last measurement.
+
+        Args:
+            k: Number of the throw.
+            rate: Samples a second [Hz].
+        """
+        problem = self.problem
+        states, rows, _ = problem.states_and_rows(k, self.parameters_of(k))
+        times = np.arange(0.0, float(problem.throws[k].times[-1]), 1.0 / rate)
+        flown = fly_sampled(states, rows, problem.setup, times, step=problem.step, duration=0.0)
+        sampled = np.empty((len(times), COLUMNS))
+        sampled[:, 0] = times
+        sampled[:, 1:-3] = flown.states[0]
+        sampled[:, -3:] = paper_from_map(np.array([*self.wind, 0.0]))
+        return Trajectory(sampled, problem.setup.disc.diameter)
 
     def residuals(self, k: int) -> dict[str, FloatArray]:
         """Return predictions minus measurements of throw `k` by instrument, each (n, d)."""

@@ -7,10 +7,14 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import Identification
 from disc_sim_ros.estimation.observations import UNITS, Camera, Positions
+from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.physics.frames import map_from_paper
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+_MOST_NAMES = 8  # throws in a legend
 
 
 def paths(result: Identification) -> 'Figure | None':
@@ -25,16 +29,19 @@ def paths(result: Identification) -> 'Figure | None':
                 drawn.append((throw.name, _in_map(measured), _in_map(fitted)))
     if not drawn:
         return None
-    figure, (above, side) = _figure(2, 7.0)
-    for name, measured, fitted in drawn:
-        (line,) = above.plot(fitted[:, 0], fitted[:, 1], label=name)
+    figure, (above, side) = _figure(2, 9.0)
+    for i, (name, measured, fitted) in enumerate(drawn):
+        (line,) = above.plot(fitted[:, 0], fitted[:, 1], color=_colour(i), label=name)
         above.plot(measured[:, 0], measured[:, 1], '.', ms=3, color=line.get_color(), alpha=0.5)
         if measured.shape[1] > 2:
             side.plot(fitted[:, 0], fitted[:, 2], color=line.get_color())
             side.plot(measured[:, 0], measured[:, 2], '.', ms=3, color=line.get_color(), alpha=0.5)
     above.set(xlabel='x, m', ylabel='y (left), m', title='from above: dots measured, lines fitted')
     side.set(xlabel='x, m', ylabel='z (up), m', title='from the side')
-    above.legend(fontsize='small')
+    for ax in (above, side):
+        ax.set_aspect('equal', adjustable='datalim')
+        ax.grid(color='0.9')
+    _legend(above, len(drawn))
     return figure
 
 
@@ -53,10 +60,12 @@ def residuals(result: Identification) -> 'Figure':
             for o in throw.observations:
                 if o.kind == kind:
                     r = result.residuals(k)[kind]
-                    ax.plot(o.t, np.sqrt((r**2).mean(axis=1)), lw=0.8, label=throw.name)
-        ax.axhline(result.problem.noise[kind], color='0.5', ls='--', lw=1.0)
-        ax.set(xlabel='time, s', ylabel=f'{kind}, {UNITS[kind]}', ylim=(0.0, None))
-        ax.set_title(f'{kind}: rms of the components; dashed: the noise')
+                    rms = np.sqrt((r**2).mean(axis=1))
+                    ax.plot(o.t, rms, lw=0.8, color=_colour(k), label=throw.name)
+        ax.axhline(result.problem.noise[kind], color='0.5', ls='--', lw=1.0, label='noise')
+        ax.set(xlabel='time, s', ylabel=f'residual, {UNITS[kind]}', ylim=(0.0, None))
+        ax.set_title(f'{kind}: fitted less measured, rms of the components')
+        _legend(ax, len(result.problem.throws))
     return figure
 
 
@@ -68,8 +77,18 @@ def correlations(result: Identification) -> 'Figure':
     ax.set_xticks(range(len(names)), names, rotation=60, ha='right')
     ax.set_yticks(range(len(names)), names)
     figure.colorbar(image, ax=ax)
-    ax.set_title('correlations')
+    ax.set_title('correlations of the fitted parameters')
     return figure
+
+
+def _colour(i: int) -> str:
+    return COLOURS[i % len(COLOURS)]
+
+
+def _legend(ax: 'Axes', throws: int) -> None:
+    """Add a legend, unless it has more throws than can be told apart."""
+    if throws <= _MOST_NAMES:
+        ax.legend(fontsize='small')
 
 
 def _figure(rows: int, height: float) -> tuple['Figure', Any]:

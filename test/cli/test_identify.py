@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+import re
 
 import numpy as np
 import pytest
@@ -66,6 +67,20 @@ def test_a_file_becomes_a_disc_a_report_and_a_document(throw, tmp_path, capsys):
     page = (folder / 'report.html').read_text()
     assert page.count('<img') == 3
     assert 'src="http' not in page
+    assert '<a href="throws.html">' in page
+    data = re.search(
+        '<script type="application/json" id="flights">(.*?)</script>',
+        (folder / 'throws.html').read_text(),
+    )
+    (track,) = json.loads(data[1])['tracks']
+    measured = np.genfromtxt(throw, delimiter=',', names=True)
+    assert track['t'][-1] == pytest.approx(
+        np.ptp(measured['t_s']), abs=0.01
+    )  # 200 samples a second
+    # The noise of the measurements is 5 mm.
+    assert track['position'][:3] == pytest.approx(
+        [measured[name][0] for name in ('x_m', 'y_m', 'z_m')], abs=0.03
+    )
     assert json.loads((folder / 'report.json').read_text())['verdict'] == document['verdict']
 
 
