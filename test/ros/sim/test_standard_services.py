@@ -238,6 +238,19 @@ def test_many_steps_do_not_block_the_node(ros):
     assert 'Traceback' not in sim.sim.stderr
 
 
+def test_a_reset_ends_the_steps_at_once(ros):
+    sim = Standard(ros, {'launch.height': 3.0})
+    assert sim.go_to(PAUSED) == OK
+    for _ in range(5):
+        steps = sim.begin(StepSimulation, steps=1_000_000)
+        ros.spin_until(lambda: sim.state == PLAYING, 'the steps')
+        assert sim.code(ResetSimulation) == OK
+        pose, twist = sim.entity().state.pose, sim.entity().state.twist
+        assert (pose.position.x, pose.position.z, twist.linear.x) == (0.0, 3.0, 0.0)
+        ros.spin_until(steps.done, 'the interruption')
+        assert 'until reset_simulation' in steps.result().result.error_message
+
+
 def test_the_action_reports_each_step_and_can_be_cancelled(ros):
     sim = Standard(ros, {'auto_throw': False})
     client = ActionClient(ros.node, SimulateSteps, 'simulate_steps')

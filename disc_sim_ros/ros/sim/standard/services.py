@@ -3,7 +3,6 @@
 from collections.abc import Callable
 import concurrent.futures
 from contextlib import suppress
-from functools import partial
 import math
 import time
 from typing import Any
@@ -15,7 +14,7 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 from disc_sim_ros import __version__, topics
-from disc_sim_ros.errors import ConfigError, DiscSimError
+from disc_sim_ros.errors import ConfigError, DiscSimError, brief
 from disc_sim_ros.physics import frames as paper_frames
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.kernels.integrator import Observation
@@ -181,11 +180,15 @@ class StandardServices:
         if answer is not DONE:
             return answer
         self._stepping, self._interruption = True, ''
+        longest = LONGEST_BATCH if report is None else FEEDBACK_BATCH
         done = 0
+
+        def batch() -> int:  # none after a reset, which runs on the same thread
+            return 0 if self._interruption else self._loop.steps(min(steps - done, longest))
+
         try:
             while done < steps:
-                most = min(steps - done, LONGEST_BATCH if report is None else FEEDBACK_BATCH)
-                made = await self._on_simulation(partial(self._loop.steps, most))
+                made = await self._on_simulation(batch)
                 if isinstance(made, Answer):
                     return made
                 goes_on = True
@@ -244,7 +247,7 @@ class StandardServices:
     def _named(self, name: str) -> Answer:
         if name == self.entity:
             return DONE
-        return Answer(Code.NOT_FOUND, f'entity: {name!r} is unknown; give {self.entity}')
+        return Answer(Code.NOT_FOUND, f'entity: {brief(name)} is unknown; give {self.entity}')
 
     def _place(self, request: Any) -> Answer:
         """Put the disc into a state, on the simulation thread."""
