@@ -34,6 +34,7 @@ from disc_sim_ros.quantities import COEFFICIENT_SPREAD
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
 _NORMAL = 1.4826  # standard deviation over median of the absolute values, of normal numbers
 _WORST_FIT = 30.0  # times the usual noise of an instrument: beyond, it is no flight of such a disc
+_HOPELESS = 3.0  # times as far, with which a first fit is refused already
 _START_SPREAD = 0.5  # of the prior: how far other starts lie
 _START_STEPS = 12
 _ROUNDS = 2  # of estimating the noise and fitting with it
@@ -192,12 +193,13 @@ def identify(
         best = Best(x)
         rough = replace(problem, margin=ROUGH)
         x = _from_starts(rough, x, _Search(starts, seed, best, progress)).x
+        given = set(noise or {})
+        _refuse_misfit(problem, _noise(rough, x, given), given, _HOPELESS)
         problem, x, left_out = _identifiable(problem, x, refuse=free is not None, anyway=anyway)
         best = Best(x)
         solution = solve(problem, x, best=best, progress=progress, stage='fit')
         problem, x = _without_each(problem, solution, progress)
         best = Best(x)
-        given = set(noise or {})
         for number in range(_ROUNDS):
             estimated = _noise(problem, x, given)
             changed = max(abs(estimated[kind] / problem.noise[kind] - 1.0) for kind in estimated)
@@ -366,14 +368,16 @@ def _noise(problem: Problem, x: FloatArray, given: set[str]) -> dict[str, float]
     }
 
 
-def _refuse_misfit(problem: Problem, estimated: Mapping[str, float], given: set[str]) -> None:
+def _refuse_misfit(
+    problem: Problem, estimated: Mapping[str, float], given: set[str], margin: float = 1.0
+) -> None:
     """Refuse measurements that no disc like the base disc gives.
 
     Raises:
         ConfigError: The residuals are far larger than the noise of any such instrument.
     """
     for kind, sigma in estimated.items():
-        if kind not in given and sigma > _WORST_FIT * NOISE[kind]:
+        if kind not in given and sigma > margin * _WORST_FIT * NOISE[kind]:
             raise ConfigError(
                 kind,
                 f'{sigma:.3g} {UNITS[kind]}',

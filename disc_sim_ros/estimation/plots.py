@@ -29,19 +29,20 @@ def paths(result: Identification) -> 'Figure | None':
                 drawn.append((throw.name, _in_map(measured), _in_map(fitted)))
     if not drawn:
         return None
-    figure, (above, side) = _figure(2, 9.0)
-    for i, (name, measured, fitted) in enumerate(drawn):
-        (line,) = above.plot(fitted[:, 0], fitted[:, 1], color=_colour(i), label=name)
-        above.plot(measured[:, 0], measured[:, 1], '.', ms=3, color=line.get_color(), alpha=0.5)
-        if measured.shape[1] > 2:
-            side.plot(fitted[:, 0], fitted[:, 2], color=line.get_color())
-            side.plot(measured[:, 0], measured[:, 2], '.', ms=3, color=line.get_color(), alpha=0.5)
-    above.set(xlabel='x, m', ylabel='y (left), m', title='from above: dots measured, lines fitted')
-    side.set(xlabel='x, m', ylabel='z (up), m', title='from the side')
-    for ax in (above, side):
+    views = [(1, 'y (left), m', 'from above: dots measured, lines fitted')]
+    if any(measured.shape[1] > 2 for _, measured, _ in drawn):
+        views.append((2, 'z (up), m', 'from the side'))
+    figure, axes = _figure(len(views), 4.5 * len(views))
+    for ax, (column, label, title) in zip(np.atleast_1d(axes), views, strict=True):
+        for i, (name, measured, fitted) in enumerate(drawn):
+            if measured.shape[1] > column:
+                (line,) = ax.plot(fitted[:, 0], fitted[:, column], color=_colour(i), label=name)
+                dots = measured[:, 0], measured[:, column]
+                ax.plot(*dots, '.', ms=3, color=line.get_color(), alpha=0.5)
+        ax.set(xlabel='x, m', ylabel=label, title=title)
         ax.set_aspect('equal', adjustable='datalim')
         ax.grid(color='0.9')
-    _legend(above, len(drawn))
+        _legend(ax, len(drawn))
     return figure
 
 

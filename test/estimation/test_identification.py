@@ -31,10 +31,13 @@ def true_values() -> np.ndarray:
     return base_of(BASE).values * np.array([1.15, 0.9, 1.1, 0.85, 1.4, 0.85, 1.6, 0.8, 1.02])
 
 
-def session(count: int, kinds: tuple[str, ...], seed: int = 4) -> list[Throw]:
+def session(
+    count: int, kinds: tuple[str, ...], seed: int = 4, values: np.ndarray | None = None
+) -> list[Throw]:
+    values = true_values() if values is None else values
     setup = replace(BASE, step=5e-4, wind=Wind(mean=flip_yz((*WIND, 0.0))))
     generator = np.random.default_rng(seed)
-    return synthetic_sessions.session(true_values(), setup, kinds, generator, count=count)
+    return synthetic_sessions.session(values, setup, kinds, generator, count=count)
 
 
 @pytest.fixture(scope='module')
@@ -109,9 +112,10 @@ def test_a_throw_that_was_left_out_is_predicted(result):
     assert 'coefficients are known' in report.text(result, misses)
 
 
-def test_the_same_seed_gives_the_same_answer(result):
-    again = identify(session(2, ('position', 'gyro')), BASE, starts=1)
-    assert np.array_equal(again.x, result.x)
+def test_the_same_seed_gives_the_same_answer():
+    throws = session(2, ('position',), values=base_of(BASE).values)
+    first, again = (identify(throws, BASE, free=['C_D0'], starts=1, seed=3) for _ in range(2))
+    assert np.array_equal(again.x, first.x)
 
 
 def test_a_coefficient_that_the_throws_do_not_tell_is_refused():
