@@ -163,12 +163,15 @@ class Predictor:
         self._rows.insert(place, self._row(m))
         self._new = True
         if self._estimator is None:
-            start = self._rows[-1][0] - throw_detection.WINDOW - _ORDER
-            self._rows = [row for row in self._rows if row[0] >= start]
+            self._rows = self._rows[throw_detection.first_of_window(self._times()) :]
         elif len(self._rows) > MOST_MEASUREMENTS:
             half = len(self._rows) // 2
             self._rows = self._rows[:half:2] + self._rows[half:]
         return True
+
+    def _times(self) -> FloatArray:
+        """Return the times of the measurements that are kept [s]."""
+        return np.array([row[0] for row in self._rows])
 
     def _row(self, m: Measurement) -> FloatArray:
         x, y, z = m.position

@@ -6,7 +6,8 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.throw_estimator import straight
 from disc_sim_ros.physics.frames import flip
 
-WINDOW = 0.2  # s, in which a beginning is recognised
+WINDOW = 0.2  # s, in which a beginning is recognised ...
+LONGEST_WINDOW = 0.55  # ... or, with fewer measurements in it, in which the last few are
 LEAST = 6  # measurements of a beginning ...
 SHORTEST = 0.05  # ... and their time [s]
 LEAST_SPEED = 4.0  # m/s
@@ -19,6 +20,21 @@ AFTER_LANDING = 0.15  # s after the predicted landing until the throw has ended
 ENDED_BY = 6  # measurements one after the other that the flight cannot explain
 _FAR = 25.0  # their squared residual
 _ONE_STOP = 0.3  # share of the distances that outliers keep from each other: they are one object
+
+
+def first_of_window(time: FloatArray) -> int:
+    """Return the first of the measurements in which a beginning may be.
+
+    Those of WINDOW; where they are fewer than LEAST, the last LEAST, if they are not too old.
+
+    Args:
+        time: Times [s], ascending, shape (k,).
+    """
+    rounding = 1e-9
+    first = int(np.searchsorted(time, time[-1] - WINDOW - rounding))
+    few = max(len(time) - LEAST, 0)
+    oldest = int(np.searchsorted(time, time[-1] - LONGEST_WINDOW - rounding))
+    return max(min(first, few), oldest)
 
 
 def beginning(time: FloatArray, position: FloatArray, sigma: FloatArray) -> int | None:

@@ -131,6 +131,23 @@ def test_throw_begins_after_the_hand_and_ends_on_the_ground(throws):
     assert predictor.throws == 1
 
 
+@pytest.mark.parametrize('rate', [10.0, 15.0, 24.0])
+def test_throw_is_recognised_from_six_measurements_of_a_slow_tracker(rate):
+    """The disc lies still, is taken up and thrown; the sixth measurement in the air tells it."""
+    flown = throw(SETUP, PRIOR, 3, rate=rate)
+    still = [Measurement(-k / rate, (0.0, 0.0, 1.3)) for k in range(20, 0, -1)]
+    predictor = Predictor(CONFIG)
+    predictions = []
+    for m in [*still, *flown.measurements(axis=True)]:
+        predictor.add(m)
+        predictions.append(predictor.update(profiled=False))
+    first = next(p for p in predictions if p is not None)
+    assert predictor.throws == 1
+    assert first.reference_time == pytest.approx(0.0, abs=1.0 / rate + 1e-9)
+    assert first.time <= 6.0 / rate + 1e-9
+    assert miss([p for p in predictions if p is not None][-1], flown) < 0.2
+
+
 def test_catch_ends_a_throw(throws):
     t = throws[0]
     predictor = Predictor(CONFIG)
