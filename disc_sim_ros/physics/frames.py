@@ -22,12 +22,14 @@ from numpy.typing import ArrayLike
 
 from disc_sim_ros.arrays import FloatArray, Vector
 from disc_sim_ros.physics.kernels.equations import DISC, DISC_AIR, DISC_BODY, State
+from disc_sim_ros.physics.kernels.jit import inline
 from disc_sim_ros.physics.kernels.rotation import (
     Quaternion,
     cos_sin_degrees,
     quaternion_of_half_angles,
     rotated,
     rotation_elements,
+    wrapped_angle,
 )
 from disc_sim_ros.topics import Frames
 
@@ -51,6 +53,7 @@ def flip(component: _Component) -> _Component:
     return 0.0 - component
 
 
+@inline
 def flip_yz(vector: Vector) -> Vector:
     """Return a vector in REP-103 axes from the paper's axes, or the reverse.
 
@@ -89,11 +92,13 @@ def moment_axes(names: Frames) -> dict[str, int]:
 # ---- the numbers of messages ----
 
 
+@inline
 def pose(s: State) -> Pose:
     """Return position [m] and quaternion x, y, z, w of `disc` in `map`."""
     return s.X, 0.0 - s.Y, 0.0 - s.Z, s.e1, 0.0 - s.e2, 0.0 - s.e3, s.e0
 
 
+@inline
 def odometry(s: State) -> Odometry:
     """Return pose, velocity over the ground and angular velocity as nav_msgs/Odometry has them.
 
@@ -180,17 +185,19 @@ def states_from_odometry(numbers: FloatArray) -> FloatArray:
     return np.hstack([position, velocity, e, rates, np.zeros((len(numbers), 1))]) + 0.0
 
 
+@inline
 def spin_joint(s: State) -> tuple[float, float]:
     """Return the angle [rad] and the rate [rad/s] of `disc_body` in `disc`, about z up.
 
     The angle lies between -pi and pi.
     """
-    return math.remainder(0.0 - s.sigma, math.tau), 0.0 - s.r
+    return wrapped_angle(0.0 - s.sigma), 0.0 - s.r
 
 
+@inline
 def spin_transform(s: State) -> tuple[float, float]:
     """Return z and w of the quaternion of `disc_body` in `disc`; x and y are 0."""
-    half = 0.5 * math.remainder(0.0 - s.sigma, math.tau)
+    half = 0.5 * wrapped_angle(0.0 - s.sigma)
     return math.sin(half), math.cos(half)
 
 

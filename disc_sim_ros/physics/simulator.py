@@ -1,7 +1,9 @@
 """A flight in single steps, with control on the way: the one mutable object of `physics`."""
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from disc_sim_ros.physics import disc_file, frames
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup, checked_control, lost
 from disc_sim_ros.physics.kernels import integrator
-from disc_sim_ros.physics.kernels.equations import Control, State, Velocity
+from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
 from disc_sim_ros.physics.kernels.integrator import (
     INTEGRATOR_STATE_SIZE,
     LANDED,
@@ -20,7 +22,7 @@ from disc_sim_ros.physics.kernels.integrator import (
     Observation,
 )
 from disc_sim_ros.physics.kernels.jit import note_before
-from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, wind_at
+from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, WindData, wind_at
 from disc_sim_ros.physics.launch import Launch, require_above_ground
 
 _GUST = slice(1 + STATE_SIZE, 4 + STATE_SIZE)  # in an IntegratorState
@@ -158,6 +160,27 @@ class FlightSimulator:
             raise lost(t, setup.step)
         self.steps += steps
 
+    def step_arguments(
+        self, steps: int
+    ) -> tuple[FloatArray, Plant, WindData, FloatArray, float, bool, FloatArray]:
+        """Return what `integrator.advance_steps` needs for some steps, except for the control.
+
+        For a disc in the air with a step made. Compiled code that makes steps with them changes
+        the arrays, and is followed by `count`.
+        """
+        setup = self.setup
+        noise = self._noise_until(self.steps + steps)
+        step = float(setup.step)
+        return (
+            self._flight, setup.plant, setup.wind_data, noise, step, self.ground, self._landing
+        )  # fmt: skip
+
+    def count(self, steps: int) -> None:
+        """Count steps that were made with `step_arguments`, or that passed after the landing."""
+        self.steps += steps
+        if not self.landed:
+            self._state = State(*self._flight[1 : 1 + STATE_SIZE].tolist())
+
     def _noise_until(self, step: int) -> FloatArray:
         """Return the gust noise of all steps up to `step`: the numbers that `fly` draws."""
         if self.setup.wind.turbulence == 0.0:
@@ -175,9 +198,13 @@ def wind_at_disc(state: State, gust: Velocity, setup: Setup) -> Velocity:
     return wind_at(state.Z, gust, setup.wind_data)
 
 
-def first_call_note() -> str:
-    """Return one line for users on why `warm_up` or steps take long; '' if they do not."""
-    return note_before(integrator.advance_steps, integrator.observe, seconds=10)
+def first_call_note(*more: Callable[..., Any]) -> str:
+    """Return one line for users on why `warm_up` or steps take long; '' if they do not.
+
+    Args:
+        more: Other compiled functions that are called.
+    """
+    return note_before(integrator.advance_steps, integrator.observe, *more, seconds=10)
 
 
 def warm_up() -> None:

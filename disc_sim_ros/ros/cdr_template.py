@@ -34,9 +34,13 @@ class CdrTemplate:
             message, with the stamp in all `stamps` and the values in the order of `floats`. It has
             no state: threads may share it. Without stamps the first two arguments have no effect.
             The caller checks that the values are finite.
+        template: The complete serialised message; its stamps and values mean nothing.
+        stamp_offsets: Where the seconds of each stamp are in it, an int32 before an uint32 of
+            nanoseconds, in bytes from the start.
+        float_offsets: Where the values are in it, in the order of `floats`.
     """
 
-    __slots__ = ('pack',)
+    __slots__ = ('float_offsets', 'pack', 'stamp_offsets', 'template')
 
     def __init__(
         self, message: Any, floats: Sequence[str], stamps: Sequence[str] = ('header.stamp',)
@@ -63,6 +67,10 @@ class CdrTemplate:
         places = _places(message, types | dict.fromkeys(floats, _DOUBLE))
         template = _template(message, places)
         self.pack = _packer(template, parameters, [(fields[p.path], p) for p in places])
+        offsets = {p.path: p.offset for p in places}
+        self.template = template
+        self.stamp_offsets = tuple(offsets[f'{stamp}.sec'] for stamp in stamps)
+        self.float_offsets = tuple(offsets[path] for path in floats)
 
 
 class _Primitive(NamedTuple):

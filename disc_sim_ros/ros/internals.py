@@ -4,6 +4,8 @@
   executor puts them into a queue, from which the thread takes them.
 - `_rclpy_pybind11.EventHandle`: a thread polls the events of a subscription. Without it, the
   executor reports them.
+- `handle.pointer` of publishers and subscriptions, and the C functions of rcl: compiled code
+  publishes and takes messages (`native_topics`). Without them, Python does.
 - `Node._parameter_overrides`: a misspelt parameter in a file or on the command line is an error.
   Without it, only parameters that exist take their values; other names are ignored.
 
@@ -15,12 +17,17 @@ the executor costs, and messages that it has not taken when it ends are lost.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, suppress
+import ctypes
 from functools import partial
+import os
+import platform
+import sys
 import threading
 from typing import Any, Protocol
 
+import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import (
@@ -29,6 +36,7 @@ from rclpy.event_handler import (
     UnsupportedEventTypeError,
 )
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
@@ -103,6 +111,13 @@ class PolledSubscription:
         take = _take_message_of(self._subscription)
         self.take = self._dequeue if take is None else partial(take, message_type, raw)
 
+    @property
+    def handle(self) -> Any:
+        """Return the handle that takes messages; AttributeError where the executor takes them."""
+        handle = self._subscription.handle
+        handle.take_message  # noqa: B018
+        return handle
+
     def has_publishers(self) -> bool:
         """Return True while a publisher is matched; for any thread."""
         return self._subscription.get_publisher_count() > 0
@@ -144,6 +159,93 @@ class WatchedSubscription(PolledSubscription):
         """Stop watching and unsubscribe."""
         self.events.destroy()
         super().destroy()
+
+
+class _Allocator(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ('a', 'b', 'c', 'd', 'state'))
+
+
+class NativeTopics:
+    """Addresses of C functions, and of the publishers and subscriptions of a node.
+
+    They stay valid until `close`, even if the node is destroyed before.
+
+    Attributes:
+        functions: Addresses by name: publish, take, publisher_count of rcl; time and sleep of the
+            C library.
+        publishers: Addresses of `rcl_publisher_t`.
+        subscriptions: Addresses of `rcl_subscription_t`.
+        inbox: A `rcl_serialized_message_t` to take messages into, int64: address and length of
+            the bytes first; shape (8,).
+    """
+
+    def __init__(
+        self, publishers: Sequence[Publisher], subscriptions: Sequence[PolledSubscription]
+    ) -> None:
+        """Look everything up; AttributeError, OSError or ValueError where something is absent."""
+        if sys.platform != 'linux' or platform.machine() not in {'x86_64', 'aarch64'}:
+            raise OSError('compiled code calls C functions on Linux alone, on 64-bit processors')
+        rcl, self._rcutils = _loaded_library('librcl.so'), _loaded_library('librcutils.so')
+        libc = ctypes.CDLL(None)
+        self.functions = {
+            'publish': _address(rcl.rcl_publish_serialized_message),
+            'take': _address(rcl.rcl_take_serialized_message),
+            'publisher_count': _address(rcl.rcl_subscription_get_publisher_count),
+            'time': _address(libc.clock_gettime),
+            'sleep': _address(libc.clock_nanosleep),
+        }
+        self._rcutils.rcutils_get_default_allocator.restype = _Allocator
+        allocator = self._rcutils.rcutils_get_default_allocator()
+        self.inbox = np.zeros(8, dtype=np.int64)
+        self._address = ctypes.c_void_p(self.inbox.ctypes.data)
+        with ExitStack() as held:
+            of_publishers = [publisher.handle for publisher in publishers]
+            of_subscriptions = [subscription.handle for subscription in subscriptions]
+            for handle in (*of_publishers, *of_subscriptions):
+                held.enter_context(handle)
+            self.publishers = _addresses(of_publishers, rcl.rcl_publisher_get_topic_name)
+            self.subscriptions = _addresses(of_subscriptions, rcl.rcl_subscription_get_topic_name)
+            make = self._rcutils.rcutils_uint8_array_init
+            if make(self._address, ctypes.c_size_t(1024), ctypes.byref(allocator)) != 0:
+                raise OSError('no memory for messages')
+            held.callback(self._rcutils.rcutils_uint8_array_fini, self._address)
+            self._held = held.pop_all()
+
+    def taken(self) -> bytes:
+        """Return the serialised message in the inbox."""
+        return ctypes.string_at(int(self.inbox[0]), int(self.inbox[1]))
+
+    def close(self) -> None:
+        """Release everything."""
+        self._held.close()
+
+
+def native_topics(
+    publishers: Sequence[Publisher], subscriptions: Sequence[PolledSubscription]
+) -> NativeTopics | None:
+    """Return what compiled code needs of a node's topics; None where rclpy does not give it."""
+    try:
+        return NativeTopics(publishers, subscriptions)
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def _loaded_library(name: str) -> ctypes.CDLL:
+    """Return a library that rclpy has loaded: no other one may get its handles."""
+    return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def _addresses(handles: Sequence[Any], topic_name: Any) -> list[int]:
+    """Return the addresses of handles, each checked by the name of its topic."""
+    topic_name.argtypes, topic_name.restype = [ctypes.c_void_p], ctypes.c_char_p
+    for handle in handles:
+        if topic_name(handle.pointer) != handle.get_topic_name().encode():
+            raise ValueError('the address is not that of the handle')
+    return [handle.pointer for handle in handles]
 
 
 def parameter_overrides(node: Node, names: Iterable[str]) -> dict[str, object]:

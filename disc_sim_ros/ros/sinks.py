@@ -3,6 +3,7 @@
 `PublisherSink` publishes on a node; `sim.offline_bag.BagSink` writes the same messages to a bag.
 """
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from rclpy.event_handler import PublisherEventCallbacks
@@ -51,17 +52,23 @@ class PublisherSink:
 
     Attributes:
         has_subscribers: Whether the topic has a subscriber.
+        publisher: The publisher.
+        template: What `send` fills.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0917
         self,
         node: Node,
         message_type: type,
         name: str,
         qos: QoSProfile,
         template: CdrTemplate | None = None,
+        on_change: Callable[[], None] = lambda: None,
     ) -> None:
+        """Create the publisher; `on_change` is called after `has_subscribers` has changed."""
         self.has_subscribers = False
+        self.template = template
+        self._on_change = on_change
         self.publisher: Publisher = node.create_publisher(
             message_type,
             name,
@@ -85,6 +92,7 @@ class PublisherSink:
 
     def _on_matched(self, status: Any) -> None:
         self.has_subscribers = status.current_count > 0
+        self._on_change()
 
 
 class PublisherSinkFactory:
@@ -92,14 +100,19 @@ class PublisherSinkFactory:
 
     Attributes:
         node_name: Name of the node, with namespace, without the leading slash.
+        on_change: Called after a subscriber has come or gone, from the thread of the executor.
     """
 
     def __init__(self, node: Node) -> None:
+        self.on_change: Callable[[], None] = lambda: None
         self.node_name = node.get_fully_qualified_name()[1:]
         self._node = node
+
+    def _on_change(self) -> None:
+        self.on_change()
 
     def sink(
         self, message_type: type, name: str, qos: QoSProfile, template: CdrTemplate | None = None
     ) -> PublisherSink:
         """Return a new publisher."""
-        return PublisherSink(self._node, message_type, name, qos, template)
+        return PublisherSink(self._node, message_type, name, qos, template, self._on_change)

@@ -9,6 +9,7 @@ raises an error at every start; a changed byte could fly anything. Here the mach
 checksum, and what cannot be read or does not match is discarded and compiled again.
 """
 
+from collections.abc import Sequence
 import contextlib
 import hashlib
 import logging
@@ -30,11 +31,19 @@ _KEEP_UNUSED_S = 30 * 86400.0  # caches of older sources are removed after a mon
 _LOG = logging.getLogger(__name__)  # without handlers it writes the bare line to stderr
 
 
-def enable(dispatcher: Any) -> None:
-    """Let a compiled function keep its machine code on disk, where there is a place for it."""
+def enable(dispatcher: Any, sources: Sequence[Path] = ()) -> None:
+    """Let a compiled function keep its machine code on disk, where there is a place for it.
+
+    Args:
+        dispatcher: The function. numba itself notices changes of its file.
+        sources: Other files outside this folder whose functions it calls.
+    """
     folder = cache_folder()
     if folder is None:
         return  # it is compiled in memory
+    if sources:
+        digest = hashlib.sha256(b''.join(path.read_bytes() for path in sources))
+        folder /= digest.hexdigest()[:16]
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:

@@ -67,11 +67,24 @@ def jit(function: F) -> F:
 
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep its machine code on disk."""
-    if not COMPILED:
-        return _silent(function)
-    compiled = numba.njit(**_OPTIONS)(function)
-    code_cache.enable(compiled)
-    return _typed(compiled, function)
+    return entry_with()(function)
+
+
+def entry_with(*sources: Path) -> Callable[[F], F]:
+    """Return `entry` for a function that also calls functions outside this folder.
+
+    Args:
+        sources: The files of those functions: a change of one of them costs a compilation.
+    """
+
+    def compile_entry(function: F) -> F:
+        if not COMPILED:
+            return _silent(function)
+        compiled = numba.njit(**_OPTIONS)(function)
+        code_cache.enable(compiled, sources)
+        return _typed(compiled, function)
+
+    return compile_entry
 
 
 def _silent(function: F) -> F:

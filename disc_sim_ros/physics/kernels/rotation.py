@@ -6,6 +6,7 @@ from typing import Any
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.physics.kernels.jit import inline
 
+_TURN = 2.0 * math.pi
 Quaternion = tuple[float, float, float, float]
 
 
@@ -40,6 +41,22 @@ def rotation_elements(e0: Any, e1: Any, e2: Any, e3: Any) -> tuple[Any, ...]:
         2 * (e2 * e3 + e0 * e1),
         1 - 2 * (e1 * e1 + e2 * e2),
     )
+
+
+@inline
+def wrapped_angle(angle: float) -> float:
+    """Return an angle less whole turns, between -pi and pi [rad]: `math.remainder`, to the bit.
+
+    numba does not compile that function.
+    """
+    size = abs(angle)
+    rest = size % _TURN  # exact
+    other = _TURN - rest
+    if rest > other:
+        rest = -other
+    elif rest == other:  # half a turn: the nearest even number of turns
+        rest -= 2.0 * (0.5 * (size - rest) % _TURN)
+    return math.copysign(1.0, angle) * rest
 
 
 @inline

@@ -2,6 +2,8 @@
 
 from fractions import Fraction
 
+import numpy as np
+
 from disc_sim_ros.units import NANOSECONDS
 
 
@@ -9,7 +11,7 @@ class SimClock:
     """Counts steps and converts them to nanoseconds.
 
     Attributes:
-        steps: Steps since the start or the last `restart`.
+        counter: An int64 array of shape (1,) with the steps, which a compiled loop counts up.
     """
 
     def __init__(self, start: int, rate: float) -> None:
@@ -19,9 +21,24 @@ class SimClock:
             start: The first stamp [ns].
             rate: Steps per simulated second [Hz].
         """
-        self.steps = 0
+        self.counter = np.zeros(1, dtype=np.int64)
+        self._counter = self.counter.data  # a memoryview is ten times as fast
         self._start = start
         self._num, self._den = _period(rate)
+
+    @property
+    def steps(self) -> int:
+        """Return or set the steps since the start or the last `restart`."""
+        return self._counter[0]
+
+    @steps.setter
+    def steps(self, steps: int) -> None:
+        self._counter[0] = steps
+
+    @property
+    def fraction(self) -> tuple[int, int, int]:
+        """Return r, num, den [ns]: k steps from now the stamp is `now` + (r + k num) // den."""
+        return self.steps * self._num % self._den, self._num, self._den
 
     def restart(self, rate: float) -> None:
         """Count steps anew from the present stamp, at another rate [Hz]."""

@@ -10,6 +10,7 @@ from typing import Any
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError
@@ -29,6 +30,7 @@ class CommandTopic:
 
     Attributes:
         name: Name of the topic.
+        message_type: Class of its messages.
         take: Returns the oldest message that was not taken yet, or None.
         convert: Returns the checked value of a message; raises ConfigError for a bad one.
         waiting: A heap of (stamp from which it acts [ns], order of arrival, value).
@@ -38,6 +40,7 @@ class CommandTopic:
     """
 
     name: str
+    message_type: type
     take: Callable[[], Taken | None]
     convert: Callable[[Any], Any]
     waiting: list[tuple[int, int, Any]] = field(default_factory=list)
@@ -61,21 +64,26 @@ class CommandTopic:
 
 
 class Commands:
-    """The command topics of one node. Only the simulation thread uses it."""
+    """The command topics of one node. Only the simulation thread uses it.
+
+    Attributes:
+        all: The topics.
+        subscriptions: Their subscriptions, in the same order.
+    """
 
     def __init__(self, node: Node | None, frames: topics.Frames) -> None:
         """Subscribe to every command topic; without a node no command ever arrives."""
         self._order = itertools.count()
 
-        self._subscriptions: list[PolledSubscription] = []
+        self.subscriptions: list[PolledSubscription] = []
 
         def topic(name: str, message_type: type, convert: Callable[..., Any]) -> CommandTopic:
             take: Callable[[], Taken | None] = _no_message
             if node is not None:
                 subscription = PolledSubscription(node, message_type, name, qos.COMMAND_QOS)
-                self._subscriptions.append(subscription)
+                self.subscriptions.append(subscription)
                 take = subscription.take
-            return CommandTopic(name, take, lambda message: convert(message, frames))
+            return CommandTopic(name, message_type, take, lambda message: convert(message, frames))
 
         self.moment = topic(topics.CMD_MOMENT, WrenchStamped, messages.moment_from_wrench)
         self.coefficients = topic(
@@ -88,7 +96,7 @@ class Commands:
     @property
     def have_publishers(self) -> bool:
         """Return True if a publisher of commands is matched: one may arrive at any moment."""
-        return any(subscription.has_publishers() for subscription in self._subscriptions)
+        return any(subscription.has_publishers() for subscription in self.subscriptions)
 
     def poll(self, now: int, on_drop: Callable[[CommandTopic], None]) -> None:
         """Take the messages that have arrived, and put them in order of their stamps.
@@ -102,11 +110,19 @@ class Commands:
                 taken = topic.take()
                 if taken is None:
                     break
-                try:
-                    self.accept(topic, taken[0], now)
-                except ConfigError as error:
-                    topic.drop(str(error))
-                    on_drop(topic)
+                self.take(topic, taken[0], now, on_drop)
+
+    def take(
+        self, topic: CommandTopic, message: Any, now: int, on_drop: Callable[[CommandTopic], None]
+    ) -> None:
+        """Accept a message, or its serialised bytes, or drop it; see `poll`."""
+        if isinstance(message, bytes):
+            message = deserialize_message(message, topic.message_type)
+        try:
+            self.accept(topic, message, now)
+        except ConfigError as error:
+            topic.drop(str(error))
+            on_drop(topic)
 
     def accept(self, topic: CommandTopic, message: Any, now: int) -> None:
         """Check a message and let it wait for its time; `now` as in `poll`.
@@ -121,8 +137,12 @@ class Commands:
         if len(topic.waiting) >= MOST_WAITING:
             allowed = f'{MOST_WAITING} commands at most may wait for their time'
             raise ConfigError(topic.name, 'one more', allowed)
-        heapq.heappush(topic.waiting, (at, next(self._order), value))
+        self.enqueue(topic, at, value)
         topic.accepted += 1
+
+    def enqueue(self, topic: CommandTopic, at: int, value: Any) -> None:
+        """Let a checked value wait for its time [ns], behind those of the same time."""
+        heapq.heappush(topic.waiting, (at, next(self._order), value))
 
     @property
     def any_waiting(self) -> bool:
@@ -171,32 +191,40 @@ class ActiveControl:
 
     Attributes:
         control: The control inputs, in the paper's signs.
+        moment_until: Stamp at which the moment expires [ns], or inf.
+        coefficients_until: The same for the coefficients.
     """
 
     def __init__(self) -> None:
         self.control = Control(axes=DISC_AIR)
-        self._moment_until: float = math.inf
-        self._coefficients_until: float = math.inf
+        self.moment_until: float = math.inf
+        self.coefficients_until: float = math.inf
 
     def set_moment(self, moment: tuple[float, float, float, int], until: float) -> None:
         """Set the moment L, M, N [N m] and its axes, until a stamp [ns]."""
         L, M, N, axes = moment
         self.control = self.control._replace(L=L, M=M, N=N, axes=axes)
-        self._moment_until = until
+        self.moment_until = until
 
     def set_coefficients(self, values: tuple[float, float, float], until: float) -> None:
         """Set the coefficients C_L, C_M, C_N, until a stamp [ns]."""
         C_L, C_M, C_N = values
         self.control = self.control._replace(C_L=C_L, C_M=C_M, C_N=C_N)
-        self._coefficients_until = until
+        self.coefficients_until = until
+
+    def restore(self, control: Control, moment_until: float, coefficients_until: float) -> None:
+        """Take all attributes as compiled code has left them."""
+        self.control = control
+        self.moment_until = moment_until
+        self.coefficients_until = coefficients_until
 
     def expired(self, now: int) -> tuple[bool, bool]:
         """Return whether the moment and the coefficients have expired at a stamp [ns]."""
-        return now >= self._moment_until, now >= self._coefficients_until
+        return now >= self.moment_until, now >= self.coefficients_until
 
     def next_expiry(self) -> float:
         """Return the first stamp at which one of them expires [ns], or inf."""
-        return min(self._moment_until, self._coefficients_until)
+        return min(self.moment_until, self.coefficients_until)
 
 
 def _no_message() -> None:

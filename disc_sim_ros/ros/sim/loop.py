@@ -14,15 +14,18 @@ from disc_sim_ros.physics.kernels.integrator import Observation
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import Commands
+from disc_sim_ros.ros.sim.compiled_loop import (
+    LONGEST_QUANTUM,
+    LONGEST_SLEEP,
+    UNWATCHED_QUANTUM,
+    compiled_loop,
+)
 from disc_sim_ros.ros.sim.config import SimConfig
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.realtime import Pacer, configure_thread
 from disc_sim_ros.ros.sim.simulation import Counts, Simulation
 
-LONGEST_SLEEP = 0.01  # s
 LONGEST_WAIT = 0.5  # s of wall time that a request waits for the next message
-LONGEST_QUANTUM = 1e-3  # s of simulated time between two polls of the command topics, at a pace
-UNWATCHED_QUANTUM = 5e-3  # s, the same while no publisher of commands and no clock is matched
 FAST_QUANTUM = 0.02  # s of simulated time, as fast as possible, where it takes almost no wall time
 LONGEST_BATCH = 0.02  # s of wall time for steps, until other requests have their turn
 _Result = TypeVar('_Result')
@@ -74,6 +77,7 @@ class SimLoop(threading.Thread):
         self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._wake = threading.Event()
         self._ended = threading.Event()
+        self._compiled = compiled_loop(self._simulation, publishers)
 
     # ---- for other threads ----
 
@@ -102,12 +106,19 @@ class SimLoop(threading.Thread):
         future: Future[_Result] = Future()
         self._requests.append((action, future))
         self._wake.set()
+        self.interrupt()
         return future
 
     def end(self) -> None:
         """Ask the thread to end; `join` waits for it."""
         self._ended.set()
         self._wake.set()
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Let the thread look at what has changed: subscribers, requests."""
+        if self._compiled is not None:
+            self._compiled.interrupt()
 
     # ---- actions for `submit` ----
 
@@ -248,6 +259,14 @@ class SimLoop(threading.Thread):
         sim.publish_markers()
         self._publish_step(serve=True)
         self._restart_pacer()
+        try:
+            self._fly()
+        finally:
+            if self._compiled is not None:
+                self._compiled.close()
+
+    def _fly(self) -> None:
+        sim = self._simulation
         while not self._ended.is_set():
             sim.poll(ask=not self.follows_wall)
             if self.paused or self._idle():
@@ -259,8 +278,17 @@ class SimLoop(threading.Thread):
             elif self._requests and self._time_to_message() > LONGEST_WAIT:
                 self.clock.restart(sim.config.physics_rate)  # then a message is due now
                 self._publish_step(serve=True)
-            else:
+            elif not self._fly_compiled():
                 self._advance(self._wait_for_steps(), serve=True)
+
+    def _fly_compiled(self) -> bool:
+        """Fly in compiled code, at a pace; return False if the next step is not for that."""
+        if self._compiled is None or self._simulation.config.real_time_factor == 0.0:
+            return False
+        self._compiled.rearm()
+        if self._requests or self._ended.is_set():
+            return False
+        return self._compiled.run(self.pacer)
 
     def _idle(self) -> bool:
         """Return True if time need not go on: as fast as possible, and no flight to show."""

@@ -15,10 +15,10 @@ from rclpy.parameter import Parameter
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.physics import simulator
 from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.line_limit import LineLimit
 from disc_sim_ros.ros.signals import exit_on_signal
+from disc_sim_ros.ros.sim import compiled_loop
 from disc_sim_ros.ros.sim.commands import Commands
 from disc_sim_ros.ros.sim.config import SimConfig, configuration
 from disc_sim_ros.ros.sim.diagnostics import SimDiagnostics
@@ -62,6 +62,7 @@ class SimNode(Node):
             wall=wall_clock(config, self),
             inform=self._inform,
         )
+        factory.on_change = self.loop.interrupt
         create_services(self, self.loop)
         self._standard = offer_standard_services(self, self.loop, frames)
         parameters.refuse_unused(self)
@@ -164,9 +165,9 @@ def main(args: Sequence[str] | None = None) -> int:
         The exit code: 0, 1 if the simulation broke down, 2 for bad arguments or parameters.
     """
     exit_on_signal()  # also while compiling
-    if text := simulator.first_call_note():
+    if text := compiled_loop.first_call_note():
         sys.stderr.write(f'sim_node: {text}\n')
-    simulator.warm_up()
+    compiled_loop.warm_up()
     return node_main.run('sim_node', SimNode, args)
 
 

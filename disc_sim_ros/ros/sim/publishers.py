@@ -30,7 +30,13 @@ LONGEST_PATH = 2000  # points; the oldest are removed first
 
 
 class Publishers:
-    """All topics that one simulator publishes."""
+    """All topics that one simulator publishes.
+
+    Attributes:
+        frames: Names of the frames.
+        moments: The template of `applied_moment` for each of the axes of a moment.
+        spin_transform: The template of the second message of each state on `transform`.
+    """
 
     def __init__(  # noqa: PLR0915 - a list of topics
         self, factory: SinkFactory, frames: topics.Frames, *, with_clock: bool
@@ -56,7 +62,7 @@ class Publishers:
         self.transform = sink(topics.TRANSFORM, tilt, messages.TRANSFORM_FIELDS)
         spin = TransformStamped(child_frame_id=body)
         spin.header.frame_id = disc
-        self._spin_transform = CdrTemplate(spin, messages.SPIN_TRANSFORM_FIELDS)
+        self.spin_transform = CdrTemplate(spin, messages.SPIN_TRANSFORM_FIELDS)
         # No motor turns the joint. Behind an empty list Fast CDR leaves bytes that rosbags refuses
         joint = JointState(name=[topics.SPIN_JOINT], position=[0.0], velocity=[0.0], effort=[0.0])
         self.joint_states = sink(topics.JOINT_STATES, joint, messages.JOINT_FIELDS)
@@ -88,9 +94,7 @@ class Publishers:
         self.release = factory.sink(Odometry, topics.RELEASE, qos.LATCHED_QOS)
         self._release = CdrTemplate(odometry, messages.ODOMETRY_FIELDS)
         self.applied_moment = factory.sink(WrenchStamped, topics.APPLIED_MOMENT, qos.STATE_QOS)
-        self._moments = {
-            axes: _torque_template(name) for name, axes in moment_axes(frames).items()
-        }
+        self.moments = {axes: _torque_template(name) for name, axes in moment_axes(frames).items()}
         coefficients = Vector3Stamped()
         coefficients.header.frame_id = frames.disc_air
         self.applied_coefficients = sink(
@@ -104,6 +108,16 @@ class Publishers:
     def clock_is_followed(self) -> bool:
         """Return True if `/clock` has subscribers."""
         return self.clock is not None and self.clock.has_subscribers
+
+    @property
+    def need_python(self) -> bool:
+        """Return True if a topic has subscribers that compiled code does not publish."""
+        return (
+            self.clock_is_followed
+            or self.imu.has_subscribers
+            or self.aero_wrench.has_subscribers
+            or self.quantities_have_subscribers
+        )
 
     def publish_clock(self, nanoseconds: int, *, delay: float = -qos.CLOCK_PERIOD) -> None:
         """Publish `/clock` if it has subscribers, at most every CLOCK_PERIOD of wall time.
@@ -132,7 +146,7 @@ class Publishers:
             self.pose.send(sec, ns, *messages.pose(s))
         if self.transform.has_subscribers:
             self.transform.send(sec, ns, *messages.pose(s))
-            spin = self._spin_transform.pack(sec, ns, *messages.spin_transform(s))
+            spin = self.spin_transform.pack(sec, ns, *messages.spin_transform(s))
             self.transform.publish(spin)
         if self.tf is not None and self.tf.has_subscribers:
             self.tf.send(sec, ns, *messages.pose(s), *messages.spin_transform(s))
@@ -226,7 +240,7 @@ class Publishers:
         It is published even before a subscriber is matched; re-simulation needs every input.
         """
         L, M, N, axes_of_moment = moment
-        pack = self._moments[axes_of_moment].pack
+        pack = self.moments[axes_of_moment].pack
         self.applied_moment.publish(pack(*stamp(nanoseconds), *flip_yz((L, M, N))))
 
     def publish_applied_coefficients(self, nanoseconds: int, values: tuple[float, ...]) -> None:

@@ -25,6 +25,9 @@ class Pacer:
         slips: Number of slips so far.
         missed: Number of deadlines met later than one step, so far.
         restarts: Number of calls of `restart`.
+        period: Wall time of a step [s].
+        epoch: The deadline of step n is epoch + n period, by the steady clock [s].
+        done: Number of steps done since.
         recent: Lateness at the last deadlines [s].
         worst: Greatest lateness since the last call of `take_worst` [s].
     """
@@ -41,9 +44,9 @@ class Pacer:
 
     def restart(self, step: float, rate: float, now: float) -> None:
         """Count anew from `now`: after a pause, a throw or a change of rate."""
-        self._period = step / rate  # s of wall time for a step
-        self._epoch = now
-        self._done = 0
+        self.period = step / rate  # s of wall time for a step
+        self.epoch = now
+        self.done = 0
         self.restarts += 1
 
     def due(self, now: float, steps: int = 1) -> int:
@@ -53,27 +56,34 @@ class Pacer:
             now: The steady clock [s].
             steps: The deadline is that of the last of so many steps; before it none is due.
         """
-        late = now - self._epoch - (self._done + steps) * self._period
+        late = now - self.epoch - (self.done + steps) * self.period
         if late < 0.0:
             return 0
         self.worst = max(self.worst, late)
         self.recent.append(late)
-        if late > self._period:
+        if late > self.period:
             self.missed += 1
         if late > CATCH_UP:
             lost = late - CATCH_UP
-            self._epoch += lost
+            self.epoch += lost
             self.slipped += lost
             self.slips += 1
-        return math.floor((now - self._epoch) / self._period + 1e-9) - self._done
+        return math.floor((now - self.epoch) / self.period + 1e-9) - self.done
 
     def count(self, steps: int) -> None:
         """Count steps that are done."""
-        self._done += steps
+        self.done += steps
+
+    def add(self, steps: int, lateness: list[float]) -> None:
+        """Count steps that are done, and the lateness at the deadlines where they were due [s]."""
+        self.done += steps
+        self.recent.extend(lateness)
+        self.missed += sum(late > self.period for late in lateness)
+        self.worst = max(self.worst, *lateness) if lateness else self.worst
 
     def wait(self, now: float, steps: int) -> float:
         """Return how long to sleep until `steps` more are due [s]; negative if they are late."""
-        return self._epoch + (self._done + steps) * self._period - now
+        return self.epoch + (self.done + steps) * self.period - now
 
     def take_worst(self) -> float:
         """Return the greatest lateness since the last call [s]."""

@@ -129,6 +129,40 @@ class Simulation:
         """Return True if a message is due at the present step."""
         return self.clock.steps % self.config.steps_per_publish == 0
 
+    @property
+    def flight_simulator(self) -> FlightSimulator | None:
+        """Return the flight, which may have landed; None before the first one."""
+        return self._sim
+
+    @property
+    def state(self) -> State:
+        """Return the state of the disc, also of one that does not fly."""
+        return self._resting if self._sim is None else self._sim.state
+
+    @property
+    def next_throw(self) -> float:
+        """Return the stamp from which a message is one of a throw [ns], or inf."""
+        waiting = self.commands.throw.waiting
+        return min(self._throw_at, waiting[0][0]) if waiting else self._throw_at
+
+    @property
+    def steps_to_path(self) -> int:
+        """Return the steps to the next message that adds a point to the path; 0 if none does."""
+        every = self._messages_per_point
+        if every == 0:
+            return 0
+        steps = self.steps_to_message
+        number = self._sample(self.clock.at(self.clock.steps + steps))
+        return steps + -number % every * self.config.steps_per_publish
+
+    @property
+    def _messages_per_point(self) -> int:
+        """Return the messages from point to point of the path, or 0."""
+        rate = self.config.path_rate
+        if not self.flying or rate == 0.0:
+            return 0
+        return max(1, round(self.config.publish_rate / rate))
+
     # ---- time ----
 
     def advance(self, most: int) -> int:
@@ -327,6 +361,10 @@ class Simulation:
                     'lead',
                 )
 
+    def take(self, topic: CommandTopic, message: bytes) -> None:
+        """Accept or drop the serialised message of a command that was taken."""
+        self.commands.take(topic, message, self.clock.now, self._warn_of_drop)
+
     def _warn_of_drop(self, topic: CommandTopic) -> None:
         self._warn(f'{topic.name} dropped: {topic.reason}', topic.name)
 
@@ -348,20 +386,18 @@ class Simulation:
             if out.imu.has_subscribers:
                 errors, g = self._imu_errors, self.config.setup.air.gravity
                 exact = messages.imu(s, observed[:3], observed[3:6], errors.offset, g)
-                out.publish_imu(now, errors.add_to(exact, self._sample()))
-        rate = self.config.path_rate
-        if not self.flying or rate == 0.0:
-            return
-        if self._sample() % max(1, round(self.config.publish_rate / rate)) == 0:
+                out.publish_imu(now, errors.add_to(exact, self._sample(now)))
+        every = self._messages_per_point
+        if every and self._sample(now) % every == 0:
             out.extend_path(now, s)
 
     def publish_markers(self) -> None:
         """Publish the markers of the disc that waits for its throw."""
         self.publishers.publish_markers(self._resting, self.config.setup.disc.diameter)
 
-    def _sample(self) -> int:
-        """Return the number of messages since the release."""
-        elapsed = (self.clock.now - self._released) * self.config.publish_rate
+    def _sample(self, stamp: int) -> int:
+        """Return the number of messages from the release to a stamp [ns]."""
+        elapsed = (stamp - self._released) * self.config.publish_rate
         return round(elapsed / NANOSECONDS)
 
     def _publish_event(self, event: Event) -> None:
