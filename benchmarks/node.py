@@ -1,9 +1,10 @@
-"""CPU, lateness and start-up time of sim_node, beside a naive node.
+"""CPU, lateness and start-up time of sim_node, beside a naive node and a C++ program.
 
 Every figure is measured in this run with real processes: the node, one that subscribes to `odom`
 and `pose`, one that sends commands. CPU is that of the node's process, per cent of one core. The
 naive node runs the same physics in an rclpy timer, builds new messages, and takes commands in
-callbacks of the executor.
+callbacks of the executor. The C++ program, benchmarks/rcl_loop.cpp, calls rcl itself; it is built
+and measured where g++ is.
 
 usage: benchmarks/node.py [seconds of each measurement]
 """
@@ -13,6 +14,7 @@ from contextlib import ExitStack, contextmanager
 import os
 from pathlib import Path
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -31,11 +33,19 @@ from lines import Line, print_lines
 from node_roles import DEEP, HIGH, TYPES
 
 TICK = os.sysconf('SC_CLK_TCK')
-MOST_CPU = 15.0  # per cent of a core, with odom, pose and commands at 1 kHz
+MOST_CPP = 1.3  # times the C++ program, with odom, pose and commands at 1 kHz
+MOST_IDLE = 5.0  # per cent of a core, at 200 Hz without subscribers
 MOST_LATE = 2.0  # times the p99 of the bare thread
 MOST_STEPS = 3  # two steps and one period, from a command to its effect
 MOST_START, MOST_COLD_START = 1.5, 15.0  # s
 KEPT_UP = 0.999  # of real time, and of the messages
+SIM_NODE = (sys.executable, '-m', 'disc_sim_ros.ros.sim')
+PYTHON_LOOP = """
+import runpy
+from disc_sim_ros.ros.sim import loop
+loop.compiled_loop = lambda *_: None
+runpy.run_module('disc_sim_ros.ros.sim', run_name='__main__')
+"""
 DEADLINE = 60.0  # s, for a process to be ready
 
 
@@ -61,13 +71,27 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
     bare = bare_thread(1e-3, seconds)
     print(f'{"bare sleeping thread at 1 kHz":54s} {bare[0]:7.1f} {"":8s} {"":7s} '
           f'{bare[1] * 1e6:9.0f} {bare[2] * 1e6:9.0f}')  # fmt: skip
+    idle = measured('sim_node 200 Hz, no subscribers', 1000, 200, [], 0, seconds)
     plain = measured('sim_node 1 kHz, no subscribers', 1000, 1000, [], 0, seconds)
     both = ['odom', 'pose']
     pairs = measured('sim_node 1 kHz, odom + pose 1 kHz', 1000, 1000, both, 0, seconds)
     line = 'sim_node 1 kHz, odom + pose + commands 1 kHz'
     full = measured(line, 1000, 1000, both, 1000, seconds)
-    naive = measured('naive node, the same', 1000, 1000, both, 1000, seconds, naive=True)
+    naive, python = (
+        measured(f'{kind}, the same', 1000, 1000, both, 1000, seconds, kind=kind)
+        for kind in ('naive', 'Python loop')
+    )
     fast = measured('sim_node 10 kHz, odom + pose 10 kHz', 10000, 10000, both, 0, seconds)
+    cpp = fast_cpp = None
+    if shutil.which('g++'):
+        line = 'C++ on rcl, odom + pose + commands 1 kHz'
+        cpp = measured(line, 1000, 1000, both, 1000, seconds, kind='C++')
+        line = 'C++ on rcl, odom + pose 10 kHz'
+        fast_cpp = measured(line, 10000, 10000, both, 0, seconds, kind='C++')
+    every, python_every = (
+        measured(f'{kind} 1 kHz, all topics', 1000, 1000, list(TYPES), 0, seconds, kind=kind)
+        for kind in ('sim_node', 'Python loop')
+    )
     print(f'\nodom + pose cost {pairs[0] - plain[0]:.1f} % more than no subscribers')
     if topics_too:
         print('cost of an optional topic at 1 kHz, beyond no subscribers, CPU %:')
@@ -81,6 +105,12 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
     late = full[3] / bare[2]
     return (
         Line(
+            what='`sim_node` at 200 Hz, no subscribers',
+            ours=f'{idle[0]:.1f} % of a core',
+            bound=f'at most {MOST_IDLE:g} %',
+            kept=idle[0] <= MOST_IDLE,
+        ),
+        Line(
             what='`sim_node` at 1 kHz, no subscribers',
             ours=f'{plain[0]:.1f} % of a core',
             beside=f'a bare sleeping thread {bare[0]:.1f} %',
@@ -91,9 +121,29 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
             ours=f'{full[0]:.1f} % of a core',
             beside=f'rclpy timer, new messages {naive[0]:.1f} %',
             ratio=naive[0] / full[0],
-            bound=f'at most {MOST_CPU:g} % of a core',
-            kept=full[0] <= MOST_CPU,
             short=True,
+        ),
+        Line(
+            what='the same',
+            ours=f'{full[0]:.1f} % of a core',
+            beside='C++ on rcl: no g++, not measured'
+            if cpp is None
+            else f'C++ on rcl {cpp[0]:.1f} %',
+            ratio=None if cpp is None else cpp[0] / full[0],
+            bound=f'at most {MOST_CPP:g} times the C++ program',
+            kept=None if cpp is None else full[0] <= MOST_CPP * cpp[0],
+        ),
+        Line(
+            what='the same',
+            ours=f'{full[0]:.1f} % of a core',
+            beside=f'its loop in Python {python[0]:.1f} %',
+            ratio=python[0] / full[0],
+        ),
+        Line(
+            what=f'{len(TYPES)} topics at 1 kHz',
+            ours=f'{every[0]:.1f} % of a core',
+            beside=f'its loop in Python {python_every[0]:.1f} %',
+            ratio=python_every[0] / every[0],
         ),
         Line(
             what='the same, lateness p99',
@@ -106,8 +156,8 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
         Line(
             what='physics, `odom` and `pose` at 10 kHz',
             ours=f'{fast[1]:,.0f} messages a second, {fast[0]:.0f} % of a core',
-            beside='real time',
-            ratio=fast[2],
+            beside='real time' if fast_cpp is None else f'C++ on rcl {fast_cpp[0]:.0f} %',
+            ratio=fast[2] if fast_cpp is None else fast_cpp[0] / fast[0],
             bound='kept up',
             kept=fast[2] >= KEPT_UP and fast[1] >= KEPT_UP * 10_000,
         ),
@@ -136,7 +186,7 @@ def measured(
     command_rate: int,
     seconds: float,
     *,
-    naive: bool = False,
+    kind: str = 'sim_node',
     show: bool = True,
     **environment: str,
 ) -> tuple[float, float, float, float]:
@@ -146,10 +196,10 @@ def measured(
     """
     arguments = (physics, publish, subscribed, command_rate, seconds)
     try:
-        used, rate, factor, p50, p99 = tried(*arguments, naive=naive, **environment)
+        used, rate, factor, p50, p99 = tried(*arguments, kind=kind, **environment)
     except TimeoutError as error:  # no result about their cost
         print(f'repeated, the processes did not discover each other: {error}')
-        used, rate, factor, p50, p99 = tried(*arguments, naive=naive, **environment)
+        used, rate, factor, p50, p99 = tried(*arguments, kind=kind, **environment)
     if show:
         print(f'{label:54s} {used:7.1f} {rate:8.0f} {factor:7.4f} '
               f'{p50 * 1e6:9.0f} {p99 * 1e6:9.0f}')  # fmt: skip
@@ -163,7 +213,7 @@ def tried(
     command_rate: int,
     seconds: float,
     *,
-    naive: bool,
+    kind: str,
     **environment: str,
 ) -> tuple[float, float, float, float, float]:
     """Return CPU per cent, messages a second, real-time factor and lateness p50, p99 [s].
@@ -172,14 +222,14 @@ def tried(
         TimeoutError: The subscriber gets no message.
     """
     with ExitStack() as stack:
-        node = stack.enter_context(simulator(physics, publish, naive=naive, **environment))
+        node = stack.enter_context(simulator(physics, publish, kind, **environment))
         subscriber = None
         if subscribed:
             subscriber = stack.enter_context(role('subscribe', *subscribed))
         if command_rate:
             stack.enter_context(role('command', str(command_rate)))
         watch = stack.enter_context(Watch.running())
-        if not naive:
+        if kind not in {'naive', 'C++'}:
             watch.wait()
         if subscriber is not None:
             wait_for_line(subscriber)
@@ -197,27 +247,50 @@ def tried(
 
 @contextmanager
 def simulator(
-    physics: int, publish: int, *, naive: bool = False, **environment: str
+    physics: int, publish: int, kind: str, **environment: str
 ) -> Iterator[subprocess.Popen]:
-    """Run a node in a process of its own."""
-    if naive:
+    """Run a node in a process of its own: 'sim_node', its 'Python loop', 'naive' or 'C++'."""
+    if kind == 'naive':
         with role('naive', str(physics)) as process:
             yield process
-        return
-    with started(physics, publish, **environment) as process:
-        yield process
+    elif kind == 'C++':
+        with ExitStack() as stack:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            yield stack.enter_context(role('rcl', str(build_rcl_loop(folder)), str(physics)))
+    else:
+        python_loop = kind == 'Python loop'
+        with started(physics, publish, python_loop=python_loop, **environment) as process:
+            yield process
+
+
+def build_rcl_loop(folder: Path) -> Path:
+    """Build benchmarks/rcl_loop.cpp with the headers of the ROS that rclpy belongs to."""
+    maps = Path('/proc/self/maps').read_text(encoding='utf-8').splitlines()
+    root = next(Path(line.split()[-1]) for line in maps if line.endswith('/librcl.so')).parents[1]
+    library = folder / 'librcl_loop.so'
+    command = ['g++', '-O2', '-std=c++17', '-shared', '-fPIC', '-Wall', '-Wextra']
+    for path in (root / 'include').iterdir():
+        command += ['-isystem', str(path)]
+    command += [str(Path(__file__).with_name('rcl_loop.cpp')), '-o', str(library)]
+    command += [f'-L{root / "lib"}', '-Wl,--allow-shlib-undefined']
+    command += ['-lrcl', '-lrcutils', '-lrosidl_runtime_c']
+    for package in ('nav_msgs', 'geometry_msgs'):
+        command += [f'-l{package}__rosidl_typesupport_c', f'-l{package}__rosidl_generator_c']
+    subprocess.run(command, check=True)
+    return library
 
 
 @contextmanager
 def started(
-    physics: int, publish: int, *more: str, **environment: str
+    physics: int, publish: int, *more: str, python_loop: bool = False, **environment: str
 ) -> Iterator[subprocess.Popen]:
-    """Run sim_node with a disc that stays in the air."""
+    """Run sim_node with a disc that stays in the air, with its compiled loop or without."""
     parameters = (
         f'physics_rate:={float(physics)}', f'publish_rate:={float(publish)}',
         f'launch.height:={HIGH}', 'ground:=false', 'command_timeout:=0.5', *more,
     )  # fmt: skip
-    command = [sys.executable, '-m', 'disc_sim_ros.ros.sim', '--ros-args']
+    command = [sys.executable, '-c', PYTHON_LOOP] if python_loop else [*SIM_NODE]
+    command.append('--ros-args')
     for parameter in parameters:
         command += ['-p', parameter]
     with ended(subprocess.Popen(command, env={**os.environ, **environment})) as process:

@@ -1,8 +1,10 @@
-"""The other processes of benchmarks/node.py: a subscriber, a commander and the naive node.
+"""The other processes of benchmarks/node.py: a subscriber, a commander the nodes beside it.
 
-usage: benchmarks/node_roles.py subscribe TOPIC ... | command RATE | naive RATE
+usage: benchmarks/node_roles.py subscribe TOPIC ... | command RATE | naive RATE | rcl LIBRARY RATE
 """
 
+import ctypes
+import signal
 import sys
 import time
 
@@ -106,5 +108,19 @@ def naive(rate: str) -> None:
         pass
 
 
+def rcl(library: str, rate: str) -> None:
+    """Run the C++ program of benchmarks/rcl_loop.cpp."""
+    rclpy.init()
+    node = rclpy.create_node('loader')  # loads what the library calls
+    for name in ('odom', 'pose'):
+        node.create_publisher(TYPES[name], f'loaded_{name}', 1)
+    loop = ctypes.CDLL(library).rcl_loop
+    loop.argtypes = [ctypes.c_double]
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    loop(float(rate))
+
+
 if __name__ == '__main__':
-    {'subscribe': subscribe, 'command': command, 'naive': naive}[sys.argv[1]](*sys.argv[2:])
+    {'subscribe': subscribe, 'command': command, 'naive': naive, 'rcl': rcl}[sys.argv[1]](
+        *sys.argv[2:]
+    )

@@ -8,11 +8,13 @@ import math
 
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.physics.kernels.equations import State
+from disc_sim_ros.physics.kernels.jit import inline
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
 Reading = tuple[float, float, float, float, float, float]
 
 
+@inline
 def reading(
     s: State, acceleration: Vector, rates_change: Vector, offset: Vector, gravity: float
 ) -> Reading:

@@ -9,6 +9,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import frames, theory
 from disc_sim_ros.physics.kernels.equations import State, Velocity
+from disc_sim_ros.physics.kernels.jit import inline
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
 COLUMNS = 1 + len(State._fields) + 3  # t, the state, the wind
@@ -25,6 +26,7 @@ class Quantities(NamedTuple):
     spin_rate: float  # rad/s, the paper's r: clockwise from above positive
 
 
+@inline
 def quantities(s: State, wind: Velocity, diameter: float) -> Quantities:
     """Return what the paper plots (eqns 17, 50 and 63) of one state.
 
@@ -46,12 +48,13 @@ def quantities(s: State, wind: Velocity, diameter: float) -> Quantities:
     u = xx * V_X + yx * V_Y + zx * V_Z
     v = xy * V_X + yy * V_Y + zy * V_Z
     w = xz * V_X + yz * V_Y + zz * V_Z
-    V = math.hypot(math.hypot(u, v), w)
+    u3 = math.sqrt(u * u + v * v)  # as in `equations.flow`
+    V = math.sqrt(u3 * u3 + w * w)
     flies = V > _NO_AIRSPEED
     return Quantities(
         V,
-        theory.angle_of_attack(u, v, w) if flies else 0.0,
-        math.atan2(math.hypot(xz, yz), zz),
+        theory.angle_of_flow(w, u3) if flies else 0.0,
+        math.atan2(math.sqrt(xz * xz + yz * yz), zz),
         0.5 * r * diameter / V if flies else 0.0,
         r,
     )

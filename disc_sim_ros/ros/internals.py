@@ -171,8 +171,7 @@ class NativeTopics:
     They stay valid until `close`, even if the node is destroyed before.
 
     Attributes:
-        functions: Addresses by name: publish, take, publisher_count of rcl; time and sleep of the
-            C library.
+        functions: Addresses of functions of rcl and of the C library, by `tick.Functions`.
         publishers: Addresses of `rcl_publisher_t`.
         subscriptions: Addresses of `rcl_subscription_t`.
         inbox: A `rcl_serialized_message_t` to take messages into, int64: address and length of

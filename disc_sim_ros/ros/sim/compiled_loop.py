@@ -14,8 +14,9 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import disc_file, simulator
 from disc_sim_ros.physics.flight import NO_NOISE, Setup
 from disc_sim_ros.physics.kernels import jit
-from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.kernels.equations import Control, Velocity
 from disc_sim_ros.physics.kernels.integrator import INTEGRATOR_STATE_SIZE, STATE_SIZE
+from disc_sim_ros.physics.simulator import NOTHING
 from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT
 from disc_sim_ros.ros.cdr_template import CdrTemplate
 from disc_sim_ros.ros.internals import NativeTopics, native_topics
@@ -93,7 +94,11 @@ class CompiledLoop:
             self._floats,
             whole,
             np.zeros(tick.VALUES),
+            np.zeros(2, dtype=np.int64),
+            (0.0, 0.0, 0.0),
+            0.0,
         )
+        self._observation = np.empty(len(NOTHING))
         self._inbox = _inbox(native, publishers.frames)
         self._active, self._held = np.zeros(7), np.zeros(7)
         self._until = np.zeros(2, dtype=np.int64)
@@ -126,7 +131,7 @@ class CompiledLoop:
         sim = self._simulation
         flight, now = sim.flight_simulator, sim.clock.now
         num = sim.clock.fraction[1]
-        if self._publishers.need_python or num * (MOST_STEPS + 1) >= _LARGEST or now >= _LARGEST:
+        if self._needs_python() or num * (MOST_STEPS + 1) >= _LARGEST or now >= _LARGEST:
             return False
         if flight is not None and flight.steps == 0:
             return False  # the first step completes the release
@@ -138,13 +143,24 @@ class CompiledLoop:
             sim.take(topic, self._native.taken())
         elif reason == tick.FAILED:
             sim.publish()  # raises the error
-        return reason in {tick.DONE, tick.TAKEN}
+        return reason == tick.DONE
+
+    def _needs_python(self) -> bool:
+        """Return True if a topic has subscribers that compiled code does not publish."""
+        out = self._publishers
+        has_errors = not self._simulation.imu_errors.is_exact
+        return out.clock_is_followed or (out.imu.has_subscribers and has_errors)
 
     def _run(self, pacer: Pacer, most: int) -> int:
         sim = self._simulation
         clock, config, flight = sim.clock, sim.config, sim.flight_simulator
         for i, message in enumerate(self._messages):
             self._wanted[i] = message.sink.has_subscribers
+        out = self._publishers
+        self._outbox.needs[:] = (
+            out.quantities_have_subscribers,
+            out.imu.has_subscribers or out.aero_wrench.has_subscribers,
+        )
         self._state[:] = sim.state
         control = sim.inputs.active
         self._active[:] = control.control
@@ -152,7 +168,9 @@ class CompiledLoop:
         self._until[:] = _whole(control.moment_until), _whole(control.coefficients_until)
         reason: int = tick.run(
             self._functions,
-            self._outbox,
+            self._outbox._replace(
+                imu_offset=sim.imu_errors.offset, diameter=float(config.setup.disc.diameter)
+            ),
             self._inbox,
             tick.Inputs(
                 self._active,
@@ -213,7 +231,8 @@ class CompiledLoop:
             array, plant, wind, noise, step, ground, landing = flight.step_arguments(steps)
         return tick.Flight(
             flight is not None and not flight.landed,
-            self._state, array, self._before, plant, wind, noise, step, ground, landing,
+            self._state, Velocity(*map(float, sim.wind)), array, self._before,
+            plant, wind, noise, step, ground, landing, self._observation,
         )  # fmt: skip
 
     def _take_queues(self) -> None:
@@ -254,6 +273,9 @@ def compiled_loop(simulation: Simulation, publishers: Publishers) -> CompiledLoo
         (out.transform, out.spin_transform, spin),
         (out.joint_states, None, (tick.JOINT, tick.JOINT + 1)),
     ]
+    imu, wrench = (range(at, at + 6) for at in (tick.IMU, tick.WRENCH))
+    rows += [(out.imu, None, tuple(imu)), (out.aero_wrench, None, tuple(wrench))]
+    rows += [(sink, None, (tick.QUANTITIES + i,)) for i, sink in enumerate(out.quantities)]
     if out.tf is not None:
         rows.append((out.tf, None, motion[:7] + spin))
     messages = []
@@ -287,12 +309,28 @@ def warm_up() -> None:
     constants = (setup.plant, setup.wind_data, NO_NOISE, setup.step, True)
     tick.run(
         tick_inbox.Functions(0, 0, 0, 0, 0),
-        tick.Outbox(whole, whole, whole, whole, whole, whole, rows, floats, small, floats),
+        tick.Outbox(
+            whole,
+            whole,
+            whole,
+            whole,
+            whole,
+            whole,
+            rows,
+            floats,
+            small,
+            floats,
+            whole,
+            (0.0, 0.0, 0.0),
+            0.0,
+        ),
         tick_inbox.Inbox(
             whole, 0, whole, names, whole, table, 0, rows, np.zeros((1, 1, 1)), whole, whole
         ),
         tick.Inputs(floats, floats, whole, 0),
-        tick.Flight(_REST, floats, floats, floats, *constants, floats),
+        tick.Flight(
+            _REST, floats, Velocity(0.0, 0.0, 0.0), floats, floats, *constants, floats, floats
+        ),
         tick.Time(0, 0, 1, 1, 0, 1, 0.0, 1.0, 0, 1, 1, LONGEST_SLEEP, CATCH_UP),
         tick.Limits(0, 0, 0, 0),
         tick.Shared(whole, whole, whole, 0, whole, 0, floats, np.zeros(3, dtype=np.int64)),

@@ -28,6 +28,18 @@ class Event:
     is_error: bool = False
 
 
+@dataclass
+class Counts:
+    """Numbers of events so far, for /diagnostics."""
+
+    throws: int = 0
+    landings: int = 0
+    failures: int = 0
+    expired: int = 0
+    jumps: int = 0
+    jumped: int = 0  # ns
+
+
 RESET = Event(FlightEvent.RESET, 'the disc is back at its launch, at rest')
 COMMAND_EXPIRED = Event(FlightEvent.COMMAND_EXPIRED, 'a command was not renewed and fell to zero')
 

@@ -20,6 +20,7 @@ class ImuErrors:
 
     Attributes:
         offset: Position of the IMU from the centre of the disc, in `disc_body` [m].
+        is_exact: True if there are no errors.
     """
 
     def __init__(self, config: ImuConfig, flight: int, period: float) -> None:
@@ -49,7 +50,7 @@ class ImuErrors:
         self._follow = np.where(cut_off > 0.0, -np.expm1(-2.0 * np.pi * cut_off * period), 1.0)
         self._key = (c.seed + flight) % 2**63
         errors = (self._bias, self._deviation, self._walk, cut_off)
-        self._is_exact = not any(e.any() for e in errors) and np.isinf(self._limits).all()
+        self.is_exact = not any(e.any() for e in errors) and bool(np.isinf(self._limits).all())
         self._walks = bool(self._walk.any())
         self._block = -1
         self._noise: FloatArray = np.empty((0, 6))
@@ -62,7 +63,7 @@ class ImuErrors:
 
         The filter begins anew with a sample that does not follow the one before.
         """
-        if self._is_exact:
+        if self.is_exact:
             return reading
         block, row = divmod(sample, _BLOCK)
         if block != self._block:

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import closing, nullcontext
 import threading
 import time
 from typing import Any, TypeVar
@@ -21,9 +22,10 @@ from disc_sim_ros.ros.sim.compiled_loop import (
     compiled_loop,
 )
 from disc_sim_ros.ros.sim.config import SimConfig
+from disc_sim_ros.ros.sim.events import Counts
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.realtime import Pacer, configure_thread
-from disc_sim_ros.ros.sim.simulation import Counts, Simulation
+from disc_sim_ros.ros.sim.simulation import Simulation
 
 LONGEST_WAIT = 0.5  # s of wall time that a request waits for the next message
 FAST_QUANTUM = 0.02  # s of simulated time, as fast as possible, where it takes almost no wall time
@@ -105,18 +107,17 @@ class SimLoop(threading.Thread):
         """Call `action` on the simulation thread, between two steps; return its future result."""
         future: Future[_Result] = Future()
         self._requests.append((action, future))
-        self._wake.set()
         self.interrupt()
         return future
 
     def end(self) -> None:
         """Ask the thread to end; `join` waits for it."""
         self._ended.set()
-        self._wake.set()
         self.interrupt()
 
     def interrupt(self) -> None:
         """Let the thread look at what has changed: subscribers, requests."""
+        self._wake.set()
         if self._compiled is not None:
             self._compiled.interrupt()
 
@@ -259,15 +260,14 @@ class SimLoop(threading.Thread):
         sim.publish_markers()
         self._publish_step(serve=True)
         self._restart_pacer()
-        try:
+        with closing(self._compiled) if self._compiled else nullcontext():
             self._fly()
-        finally:
-            if self._compiled is not None:
-                self._compiled.close()
 
     def _fly(self) -> None:
         sim = self._simulation
         while not self._ended.is_set():
+            if self._fly_compiled():
+                continue  # it polls, too
             sim.poll(ask=not self.follows_wall)
             if self.paused or self._idle():
                 self._wake.wait(LONGEST_SLEEP)
@@ -278,12 +278,12 @@ class SimLoop(threading.Thread):
             elif self._requests and self._time_to_message() > LONGEST_WAIT:
                 self.clock.restart(sim.config.physics_rate)  # then a message is due now
                 self._publish_step(serve=True)
-            elif not self._fly_compiled():
+            else:
                 self._advance(self._wait_for_steps(), serve=True)
 
     def _fly_compiled(self) -> bool:
         """Fly in compiled code, at a pace; return False if the next step is not for that."""
-        if self._compiled is None or self._simulation.config.real_time_factor == 0.0:
+        if self._compiled is None or self.paused or not self._simulation.config.real_time_factor:
             return False
         self._compiled.rearm()
         if self._requests or self._ended.is_set():

@@ -109,16 +109,6 @@ class Publishers:
         """Return True if `/clock` has subscribers."""
         return self.clock is not None and self.clock.has_subscribers
 
-    @property
-    def need_python(self) -> bool:
-        """Return True if a topic has subscribers that compiled code does not publish."""
-        return (
-            self.clock_is_followed
-            or self.imu.has_subscribers
-            or self.aero_wrench.has_subscribers
-            or self.quantities_have_subscribers
-        )
-
     def publish_clock(self, nanoseconds: int, *, delay: float = -qos.CLOCK_PERIOD) -> None:
         """Publish `/clock` if it has subscribers, at most every CLOCK_PERIOD of wall time.
 

@@ -1,7 +1,7 @@
 """A disc in simulated time: throws, commands, wind, and what is published when."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 
 from disc_sim_ros import topics
@@ -21,7 +21,7 @@ from disc_sim_ros.ros.sim import events
 from disc_sim_ros.ros.sim.clock import SimClock
 from disc_sim_ros.ros.sim.commands import Commands, CommandTopic, pop_due
 from disc_sim_ros.ros.sim.config import SimConfig
-from disc_sim_ros.ros.sim.events import Event
+from disc_sim_ros.ros.sim.events import Counts, Event
 from disc_sim_ros.ros.sim.imu import ImuErrors
 from disc_sim_ros.ros.sim.inputs import Inputs
 from disc_sim_ros.ros.sim.publishers import Publishers
@@ -29,18 +29,6 @@ from disc_sim_ros.units import NANOSECONDS
 
 FAR = NANOSECONDS  # a command further ahead is probably stamped by another clock
 _AT_ONCE = ('real_time_factor', 'command_timeout', 'throw_period', 'path_rate')
-
-
-@dataclass
-class Counts:
-    """Numbers of events so far, for /diagnostics."""
-
-    throws: int = 0
-    landings: int = 0
-    failures: int = 0
-    expired: int = 0
-    jumps: int = 0
-    jumped: int = 0  # ns
 
 
 class Simulation:
@@ -52,6 +40,7 @@ class Simulation:
         inputs: The control inputs and the wind.
         counts: Numbers of events so far.
         publishers: The topics that it publishes.
+        imu_errors: The errors of the IMU in the present flight.
         config: The parameters in force; some of the newest wait for the next throw.
         flight: Number of the last flight since the start or a reset, from 1.
     """
@@ -87,7 +76,7 @@ class Simulation:
         self._asked = False  # whether the sender is on use_sim_time
         self._sim: FlightSimulator | None = None
         self._resting = at_rest(config.launch.state())
-        self._imu_errors = ImuErrors(config.imu, 0, config.publish_period)
+        self.imu_errors = ImuErrors(config.imu, 0, config.publish_period)
         self.flight = 0
         self._released = start  # later by the jumps of time since [ns]
         self._throw_at: float = start if config.auto_throw else math.inf
@@ -103,6 +92,12 @@ class Simulation:
     def awaiting_throw(self) -> bool:
         """Return True if a throw is scheduled."""
         return self._throw_at < math.inf or bool(self.commands.throw.waiting)
+
+    @property
+    def next_throw(self) -> float:
+        """Return the stamp from which a message is one of a throw [ns], or inf."""
+        waiting = self.commands.throw.waiting
+        return min(self._throw_at, waiting[0][0]) if waiting else self._throw_at
 
     @property
     def throw_due(self) -> bool:
@@ -135,15 +130,9 @@ class Simulation:
         return self._sim
 
     @property
-    def state(self) -> State:
-        """Return the state of the disc, also of one that does not fly."""
-        return self._resting if self._sim is None else self._sim.state
-
-    @property
-    def next_throw(self) -> float:
-        """Return the stamp from which a message is one of a throw [ns], or inf."""
-        waiting = self.commands.throw.waiting
-        return min(self._throw_at, waiting[0][0]) if waiting else self._throw_at
+    def wind(self) -> Velocity:
+        """Return the wind at the disc, gusts included, earth axes 1."""
+        return Velocity(*self.inputs.wind.mean) if self._sim is None else self._sim.wind
 
     @property
     def steps_to_path(self) -> int:
@@ -254,7 +243,7 @@ class Simulation:
         sim = FlightSimulator(setup, state, ground=config.ground)
         sim.take(self.inputs.active.control)
         self._sim = sim
-        self._imu_errors = ImuErrors(config.imu, self.flight, config.publish_period)
+        self.imu_errors = ImuErrors(config.imu, self.flight, config.publish_period)
         self.flight += 1
         self.counts.throws += 1
         self._released = self.clock.now
@@ -370,21 +359,20 @@ class Simulation:
 
     def publish(self) -> None:
         """Publish the present state on the topics that have subscribers."""
-        out, sim, now = self.publishers, self._sim, self.clock.now
+        out, now = self.publishers, self.clock.now
         out.publish_clock(now)
         s = self.state
         out.publish_motion(now, s)
         if out.quantities_have_subscribers:
-            wind = Velocity(*self.inputs.wind.mean) if sim is None else sim.wind
             diameter = self.config.setup.disc.diameter
-            out.publish_quantities(messages.quantities(s, wind, diameter))
+            out.publish_quantities(messages.quantities(s, self.wind, diameter))
         if out.imu.has_subscribers or out.aero_wrench.has_subscribers:
             observed = self.observe()
             if out.aero_wrench.has_subscribers:
                 force, moment = frames.flip_yz(observed[6:9]), frames.flip_yz(observed[9:12])
                 out.publish_aero_wrench(now, (*force, *moment))
             if out.imu.has_subscribers:
-                errors, g = self._imu_errors, self.config.setup.air.gravity
+                errors, g = self.imu_errors, self.config.setup.air.gravity
                 exact = messages.imu(s, observed[:3], observed[3:6], errors.offset, g)
                 out.publish_imu(now, errors.add_to(exact, self._sample(now)))
         every = self._messages_per_point

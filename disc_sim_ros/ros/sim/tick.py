@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics import frames
-from disc_sim_ros.physics.kernels.equations import Control, Plant, State
-from disc_sim_ros.physics.kernels.integrator import FLYING, advance_steps
+from disc_sim_ros.physics import frames, imu, theory, trajectory
+from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
+from disc_sim_ros.physics.kernels.integrator import FLYING, advance_steps, observe
 from disc_sim_ros.physics.kernels.jit import entry_with, inline
 from disc_sim_ros.physics.kernels.native import call
-from disc_sim_ros.physics.kernels.wind import WindData
+from disc_sim_ros.physics.kernels.wind import WindData, wind_at
 from disc_sim_ros.ros.sim import tick_inbox
 from disc_sim_ros.ros.sim.tick_inbox import (
     MOMENT,
@@ -40,7 +40,7 @@ DONE, PYTHON, TAKEN, FAILED = range(4)  # why `run` returns
 NEVER = 2**62  # ns
 APPLIED_COEFFICIENTS, APPLIED_MOMENT = 0, 1  # messages: that, one for each of `axes`, then states
 FIRST_STATE = APPLIED_MOMENT + 3
-MOTION, SPIN, JOINT, VALUES = 0, 13, 15, 17  # where the numbers of states begin in `values`
+MOTION, SPIN, JOINT, QUANTITIES, IMU, WRENCH, VALUES = 0, 13, 15, 17, 22, 28, 34  # in `values`
 _MONOTONIC, _ABSOLUTE = 1, 1  # CLOCK_MONOTONIC, TIMER_ABSTIME of Linux
 
 
@@ -56,7 +56,10 @@ class Outbox(NamedTuple):
     stamps: Ints  # places of the seconds in `whole`, or -1; shape (m, 2)
     floats: FloatArray  # all serialised messages
     whole: NDArray[np.int32]  # the same memory
-    values: FloatArray  # shape (VALUES,)
+    values: FloatArray  # shape (VALUES,): the numbers of a state, from MOTION, SPIN, ... on
+    needs: Ints  # 1 if quantities of the paper, and imu or loads, are wanted; shape (2,)
+    imu_offset: tuple[float, float, float]  # m, position of the IMU in `disc_body`
+    diameter: float  # m
 
 
 class Inputs(NamedTuple):
@@ -72,7 +75,8 @@ class Flight(NamedTuple):
     """The arguments of `integrator.advance_steps`."""
 
     flies: bool
-    state: FloatArray  # of a disc that does not fly, shape (14,)
+    state: FloatArray  # of a disc that does not fly, shape (14,) ...
+    wind_at_rest: Velocity  # ... and the wind there
     flight: FloatArray
     before: FloatArray  # of the shape of `flight`
     plant: Plant
@@ -81,6 +85,7 @@ class Flight(NamedTuple):
     step: float
     ground: bool
     landing: FloatArray
+    observation: FloatArray  # shape (12,)
 
 
 class Time(NamedTuple):
@@ -123,7 +128,7 @@ class Shared(NamedTuple):
     result: Ints  # steps made, deadlines met, topic of a command that was taken; shape (3,)
 
 
-@entry_with(Path(frames.__file__), Path(tick_inbox.__file__))
+@entry_with(*(Path(str(m.__file__)) for m in (frames, imu, theory, trajectory, tick_inbox)))
 def run(  # noqa: PLR0917
     c: Functions,
     outbox: Outbox,
@@ -188,7 +193,7 @@ def run(  # noqa: PLR0917
             k += 1
             due -= 1
             shared.counter[0] += 1
-            if at_message and not _publish_state(c, outbox, flight, _stamp(time, k)):
+            if at_message and not _publish_state(c, outbox, flight, inputs.held, _stamp(time, k)):
                 reason = FAILED
                 break
     shared.result[0] = k
@@ -227,12 +232,11 @@ def _step(flight: Flight, held: FloatArray) -> bool:
         return True
     for i in range(len(flight.flight)):
         flight.before[i] = flight.flight[i]
-    control = Control(held[0], held[1], held[2], held[3], held[4], held[5], int(held[6]))
     status, _ = advance_steps(
         flight.flight,
         1,
         flight.plant,
-        control,
+        _control(held),
         flight.wind,
         flight.noise,
         flight.step,
@@ -250,7 +254,9 @@ def _step(flight: Flight, held: FloatArray) -> bool:
 
 
 @inline
-def _publish_state(c: Functions, outbox: Outbox, flight: Flight, now: int) -> bool:
+def _publish_state(
+    c: Functions, outbox: Outbox, flight: Flight, held: FloatArray, now: int
+) -> bool:
     a = flight.state
     if flight.flies:
         a = flight.flight[1:15]
@@ -265,10 +271,44 @@ def _publish_state(c: Functions, outbox: Outbox, flight: Flight, now: int) -> bo
     for i in range(2):
         values[SPIN + i] = spin[i]
         values[JOINT + i] = joint[i]
+    if outbox.needs[0] != 0:
+        wind = flight.wind_at_rest
+        if flight.flies:
+            f = flight.flight
+            wind = wind_at(s.Z, Velocity(f[15], f[16], f[17]), flight.wind)
+        quantities = trajectory.quantities(s, wind, outbox.diameter)
+        for i in range(len(quantities)):
+            values[QUANTITIES + i] = quantities[i]
+    if outbox.needs[1] != 0:
+        _observe(outbox, flight, held, s)
     for i in range(FIRST_STATE, len(outbox.messages)):
         if outbox.wanted[i] != 0 and not _publish(c, outbox, i, now):
             return False
     return True
+
+
+@inline
+def _observe(outbox: Outbox, flight: Flight, held: FloatArray, s: State) -> None:
+    """Write what an ideal IMU reads and the aerodynamic force and moment."""
+    values, o = outbox.values, flight.observation
+    for i in range(len(o)):
+        o[i] = 0.0
+    if flight.flies:
+        observe(flight.flight, flight.plant, _control(held), flight.wind, o)
+    g = flight.plant.g
+    reading = imu.reading(s, (o[0], o[1], o[2]), (o[3], o[4], o[5]), outbox.imu_offset, g)
+    force = frames.flip_yz((o[6], o[7], o[8]))
+    moment = frames.flip_yz((o[9], o[10], o[11]))
+    for i in range(len(reading)):
+        values[IMU + i] = reading[i]
+    for i in range(3):
+        values[WRENCH + i] = force[i]
+        values[WRENCH + 3 + i] = moment[i]
+
+
+@inline
+def _control(a: FloatArray) -> Control:
+    return Control(a[0], a[1], a[2], a[3], a[4], a[5], int(a[6]))
 
 
 @inline

@@ -20,15 +20,16 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64
 
-from disc_sim_ros.physics import frames
+from disc_sim_ros.physics import frames, imu, trajectory
 from disc_sim_ros.physics.kernels import jit, rotation
-from disc_sim_ros.physics.kernels.equations import Control, State
+from disc_sim_ros.physics.kernels.equations import Control, State, Velocity
 from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.ros.cdr_template import CdrTemplate
 from disc_sim_ros.ros.internals import NativeTopics
-from disc_sim_ros.ros.messages import ODOMETRY_FIELDS
+from disc_sim_ros.ros.messages import ODOMETRY_FIELDS, Quantities
 from disc_sim_ros.ros.sim import compiled_loop
 from disc_sim_ros.ros.sim.node import SimNode
 from ros.sim_process import ALL_QOS, DEADLINE
@@ -46,6 +47,9 @@ PUBLISHED = {
     'pose': PoseStamped,
     'transform': TransformStamped,
     'joint_states': JointState,
+    'imu': Imu,
+    'aero_wrench': WrenchStamped,
+    **dict.fromkeys(Quantities._fields, Float64),
     'path': PathMessage,
     'applied_moment': WrenchStamped,
     'applied_coefficients': Vector3Stamped,
@@ -54,7 +58,7 @@ PUBLISHED = {
     'flight_events': DiagnosticStatus,
 }
 
-STATES = ('odom', 'pose', 'transform', 'joint_states')
+STATES = ('odom', 'pose', 'transform', 'joint_states', 'imu', 'aero_wrench')
 BUILT = ('path', 'flight_events')  # afresh by Python; ROS leaves their padding uninitialised
 
 
@@ -104,7 +108,8 @@ class World:
 
     def subscribed(self, sim, *names):
         """Wait until a simulator knows the subscribers of topics."""
-        sinks = vars(sim.loop._publishers).values()
+        publishers = vars(sim.loop._publishers)
+        sinks = (*publishers.values(), *publishers['quantities'])
         of = {x.publisher.topic.rpartition('/')[2]: x for x in sinks if hasattr(x, 'publisher')}
         self.until(lambda: all(of[name].has_subscribers for name in names), names)
 
@@ -200,7 +205,8 @@ def test_both_loops_publish_the_same_bytes_also_when_commands_arrive(world):
         'start_time': START, 'auto_throw': False, 'real_time_factor': PACE,
         'publish_rate': 500.0, 'launch__height': 0.9, 'launch__speed': 12.0,
         'launch__pitch': -20.0, 'command_timeout': 0.05, 'wind__turbulence': 3.0,
-        'path_rate': 50.0,
+        'path_rate': 50.0, 'imu__offset': [0.05, -0.02, 0.01],
+        'wind__roughness_length': 0.05, 'wind__x': 3.0,
     }  # fmt: skip
     spaces = {'/loop_c': True, '/loop_p': False}  # compiled, Python
     sims = {s: world.sim(s, compiled=c, **parameters) for s, c in spaces.items()}
@@ -231,10 +237,17 @@ def test_both_loops_publish_the_same_bytes_also_when_commands_arrive(world):
                 send[space, name].publish(message)
                 schedule[space] = schedule[space][1:]
     world.until(
-        lambda: all(
-            last_stamp(name, r[name]) > thrown + FLOWN
-            for r in received.values()
-            for name in STATES
+        lambda: (
+            all(
+                last_stamp(name, r[name]) > thrown + FLOWN
+                for r in received.values()
+                for name in STATES
+            )
+            and all(
+                len(messages[name]) >= len(messages['odom']) - 1
+                for messages in received.values()
+                for name in Quantities._fields
+            )
         ),
         'the last messages',
     )
@@ -278,12 +291,16 @@ def last_stamp(name, messages):
 def between(received, start, end):
     """Return the messages with stamps behind `start`, until `end` [ns]; events have none."""
     kept = dict(received)
+    of_odom = [stamp_of(deserialize_message(m, Odometry)) for m in received['odom']]
     for name, messages in received.items():
         if name not in {'flight_events', 'release'}:
             of = PUBLISHED[name]
-            stamps = [stamp_of(deserialize_message(m, of)) for m in messages]
+            if of is Float64:  # as many as of `odom`
+                stamps = of_odom[: len(messages)]
+            else:
+                stamps = [stamp_of(deserialize_message(m, of)) for m in messages]
             kept[name] = [
-                m for m, stamp in zip(messages, stamps, strict=True) if start < stamp <= end
+                m for m, stamp in zip(messages, stamps, strict=False) if start < stamp <= end
             ]
     return kept
 
@@ -422,13 +439,19 @@ def test_compiled_numbers_of_messages_have_the_bits_of_python():
 
     @numba.njit(error_model='numpy')
     def compiled(s):
-        return frames.odometry(s), frames.spin_transform(s), frames.spin_joint(s)
+        return (
+            frames.odometry(s),
+            frames.spin_transform(s),
+            frames.spin_joint(s),
+            trajectory.quantities(s, Velocity(1.0, -2.0, 0.5), 0.27),
+            imu.reading(s, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.1, 0.2, 0.3), 9.8),
+        )
 
     rng = np.random.default_rng(5)
     rows = rng.normal(size=(500, 14)) * 10.0 ** rng.integers(-3, 4, size=(500, 14))
     for row in rows.tolist():
         s = State(*row)
-        assert compiled(s) == (frames.odometry(s), frames.spin_transform(s), frames.spin_joint(s))
+        assert compiled(s) == compiled.py_func(s)
 
 
 @pytest.mark.parametrize('scale', [1e-3, 1.0, 1e3, 1e9])
