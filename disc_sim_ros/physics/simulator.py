@@ -198,13 +198,14 @@ def wind_at_disc(state: State, gust: Velocity, setup: Setup) -> Velocity:
     return wind_at(state.Z, gust, setup.wind_data)
 
 
-def first_call_note(*more: Callable[..., Any]) -> str:
+def first_call_note(*more: Callable[..., Any], seconds: int = 10) -> str:
     """Return one line for users on why `warm_up` or steps take long; '' if they do not.
 
     Args:
         more: Other compiled functions that are called.
+        seconds: How long the compilation of all of them takes, about [s].
     """
-    return note_before(integrator.advance_steps, integrator.observe, *more, seconds=10)
+    return note_before(integrator.advance_steps, integrator.observe, *more, seconds=seconds)
 
 
 def warm_up() -> None:

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.disc import Disc
-from disc_sim_ros.physics.kernels.jit import inline
 
 
 @overload
@@ -35,12 +34,6 @@ def angle_of_attack(
         return math.atan2(w, math.hypot(u, v))
     alpha: FloatArray = np.arctan2(w, np.hypot(u, v))
     return alpha
-
-
-@inline
-def angle_of_flow(w: float, u3: float) -> float:
-    """Return alpha [rad] from the velocities along and across the axis of the disc [m/s]."""
-    return math.atan2(w, u3)
 
 
 def absolute_attitude(phi: ArrayLike, theta: ArrayLike) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import frames, theory
-from disc_sim_ros.physics.kernels.equations import State, Velocity
+from disc_sim_ros.physics.kernels.equations import State, Velocity, angle_of_flow
 from disc_sim_ros.physics.kernels.jit import inline
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 
@@ -53,7 +53,7 @@ def quantities(s: State, wind: Velocity, diameter: float) -> Quantities:
     flies = V > _NO_AIRSPEED
     return Quantities(
         V,
-        theory.angle_of_flow(w, u3) if flies else 0.0,
+        angle_of_flow(w, u3) if flies else 0.0,
         math.atan2(math.sqrt(xz * xz + yz * yz), zz),
         0.5 * r * diameter / V if flies else 0.0,
         r,

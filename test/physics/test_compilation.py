@@ -175,7 +175,9 @@ def test_only_the_compiler_files_import_numba():
         if any(name.split('.')[0] in {'numba', 'llvmlite'} for name in imports(path))
     }
     folder = KERNELS.relative_to(PACKAGE).as_posix()
-    assert importers == {f'{folder}/{name}.py' for name in ('code_cache', 'jit', 'simd_numba')}
+    assert importers == {
+        f'{folder}/{name}.py' for name in ('code_cache', 'jit', 'native', 'simd_numba')
+    }
 
 
 def test_kernels_import_nothing_of_the_package_but_array_types():

@@ -152,6 +152,12 @@ def flow(s: State, wind: Velocity) -> Flow:
 
 
 @inline
+def angle_of_flow(w: float, u3: float) -> float:
+    """Return alpha of one state (eqn 17) [rad]; `flow` has it for SIMD vectors, too."""
+    return math.atan2(w, u3)
+
+
+@inline
 def coefficients(a: Flow, r: float, plant: Plant) -> Coefficients:
     """Return the coefficients without control inputs and damping (eqns 19 to 23)."""
     if plant.use_linear:

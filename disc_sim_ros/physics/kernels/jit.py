@@ -1,6 +1,7 @@
 """The one door to numba: every compiled function is compiled by a decorator of this module.
 
-(`simd_numba` tells numba how to compile SIMD vectors; `code_cache` keeps machine code on disk.)
+(`simd_numba` tells numba how to compile SIMD vectors, and `native` calls of C functions;
+`code_cache` keeps machine code on disk.)
 
 Without numba, or with NUMBA_DISABLE_JIT=1, each decorator returns the plain Python function: the
 same equations, some hundred times slower.

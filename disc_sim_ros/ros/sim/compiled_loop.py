@@ -230,7 +230,7 @@ class CompiledLoop:
         else:
             array, plant, wind, noise, step, ground, landing = flight.step_arguments(steps)
         return tick.Flight(
-            flight is not None and not flight.landed,
+            flight is not None and not flight.landed, 1,
             self._state, Velocity(*map(float, sim.wind)), array, self._before,
             plant, wind, noise, step, ground, landing, self._observation,
         )  # fmt: skip
@@ -292,8 +292,7 @@ def compiled_loop(simulation: Simulation, publishers: Publishers) -> CompiledLoo
 
 def first_call_note() -> str:
     """Return one line for users on why `warm_up` takes long; '' if it does not."""
-    compiled = (tick.run,) if jit.COMPILED else ()
-    return simulator.first_call_note(*compiled)
+    return simulator.first_call_note(*((tick.run,) if jit.COMPILED else ()), seconds=20)
 
 
 def warm_up() -> None:
@@ -329,7 +328,7 @@ def warm_up() -> None:
         ),
         tick.Inputs(floats, floats, whole, 0),
         tick.Flight(
-            _REST, floats, Velocity(0.0, 0.0, 0.0), floats, floats, *constants, floats, floats
+            _REST, 1, floats, Velocity(0.0, 0.0, 0.0), floats, floats, *constants, floats, floats
         ),
         tick.Time(0, 0, 1, 1, 0, 1, 0.0, 1.0, 0, 1, 1, LONGEST_SLEEP, CATCH_UP),
         tick.Limits(0, 0, 0, 0),

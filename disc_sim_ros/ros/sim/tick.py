@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics import frames, imu, theory, trajectory
+from disc_sim_ros.physics import frames, imu, trajectory
 from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
 from disc_sim_ros.physics.kernels.integrator import FLYING, advance_steps, observe
 from disc_sim_ros.physics.kernels.jit import entry_with, inline
@@ -75,6 +75,7 @@ class Flight(NamedTuple):
     """The arguments of `integrator.advance_steps`."""
 
     flies: bool
+    steps: int  # 1; as a literal it would compile another version, for 5 s
     state: FloatArray  # of a disc that does not fly, shape (14,) ...
     wind_at_rest: Velocity  # ... and the wind there
     flight: FloatArray
@@ -128,7 +129,7 @@ class Shared(NamedTuple):
     result: Ints  # steps made, deadlines met, topic of a command that was taken; shape (3,)
 
 
-@entry_with(*(Path(str(m.__file__)) for m in (frames, imu, theory, trajectory, tick_inbox)))
+@entry_with(*(Path(str(m.__file__)) for m in (frames, imu, trajectory, tick_inbox)))
 def run(  # noqa: PLR0917
     c: Functions,
     outbox: Outbox,
@@ -234,7 +235,7 @@ def _step(flight: Flight, held: FloatArray) -> bool:
         flight.before[i] = flight.flight[i]
     status, _ = advance_steps(
         flight.flight,
-        1,
+        flight.steps,
         flight.plant,
         _control(held),
         flight.wind,
