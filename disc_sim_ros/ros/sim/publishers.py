@@ -19,6 +19,7 @@ from disc_sim_ros.ros import messages, qos
 from disc_sim_ros.ros.cdr_template import CdrTemplate
 from disc_sim_ros.ros.messages import Quantities, Six, moment_axes, stamp
 from disc_sim_ros.ros.sim.markers import disc_bytes, field_bytes, field_markers
+from disc_sim_ros.ros.sim.path import PathBytes
 from disc_sim_ros.ros.sinks import Sink, SinkFactory
 
 try:  # not among the wheels on PyPI
@@ -85,8 +86,7 @@ class Publishers:
             self.clock = sink(topics.CLOCK, Clock(), stamps=('clock',), profile=qos.CLOCK_QOS)
         self._next_clock = 0.0  # by the steady clock [s]
         self.path = factory.sink(Path, topics.PATH, qos.STATE_QOS)
-        self._path = Path()
-        self._path.header.frame_id = map_
+        self._path = PathBytes(map_, LONGEST_PATH)
         self.markers = factory.sink(MarkerArray, topics.MARKERS, qos.LATCHED_QOS)
         self.field_markers = factory.sink(MarkerArray, topics.FIELD_MARKERS, qos.LATCHED_QOS)
         self.events = factory.sink(DiagnosticStatus, topics.FLIGHT_EVENTS, qos.LATCHED_QOS)
@@ -164,23 +164,13 @@ class Publishers:
 
     def clear_path(self) -> None:
         """Remove all points of the path."""
-        self._path.poses = []
+        self._path.clear()
 
     def extend_path(self, nanoseconds: int, s: State) -> None:
         """Add the present pose to the path, and publish it if it has subscribers."""
-        point = PoseStamped()
-        point.header.frame_id = self.frames.map
-        point.header.stamp.sec, point.header.stamp.nanosec = stamp(nanoseconds)
-        position, orientation = point.pose.position, point.pose.orientation
-        (
-            position.x, position.y, position.z,
-            orientation.x, orientation.y, orientation.z, orientation.w,
-        ) = messages.pose(s)  # fmt: skip
-        self._path.poses.append(point)
-        del self._path.poses[:-LONGEST_PATH]
+        self._path.extend(*stamp(nanoseconds), messages.pose(s))
         if self.path.has_subscribers:
-            self._path.header.stamp = point.header.stamp
-            self.path.publish(self._path)
+            self.path.publish(self._path.message())
 
     def publish_release(
         self, nanoseconds: int, s: State, configuration: str, diameter: float
