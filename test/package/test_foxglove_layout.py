@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 import re
 from typing import get_type_hints
+import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
@@ -225,6 +226,19 @@ def test_the_disc_fills_the_close_up(aspect):
     screen = on_screen(CLOSE, rim, aspect)
     assert np.abs(screen).max() < 1.0
     assert np.ptp(screen[:, 0]) > 1.0  # half the width
+
+
+def test_plotjuggler_shows_numbers_of_existing_topics(kinds):
+    """PlotJuggler names a curve by its topic and fields with slashes."""
+    root = ET.parse(ROOT / 'config/plotjuggler_layout.xml').getroot()
+    curves = list(root.iter('curve'))
+    names = [curve.get(key) for curve in curves for key in ('curve_x', 'curve_y')]
+    names += [curve.get('name') for curve in curves if curve.get('curve_x') is None]
+    names = [name for name in names if name]
+    assert len(names) == 2 * 2 + 4
+    for name in names:
+        _, topic, *fields = name.split('/')
+        assert slots(kinds[f'/{topic}'], fields) in NUMBER
 
 
 # ---- predictor ----
