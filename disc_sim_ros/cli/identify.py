@@ -287,7 +287,8 @@ def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
         validation.choice('--use', name, GROUPS)
     measured: dict[str, dict] = {}  # type: ignore[type-arg]
     for source in chosen.throws:
-        for name, columns in _read(source).items():
+        for number, columns in _read(source).items():
+            name = f'throw {number}' if number.isdigit() else number
             full = name if len(chosen.throws) == 1 else f'{Path(source).name} {name}'
             measured[full] = {k: v for k, v in columns.items() if k in {*used, 'camera'}}
             if not measured[full]:
@@ -364,7 +365,7 @@ def _provenance(chosen: argparse.Namespace, words: Sequence[str]) -> list[str]:
     """Return what made a result: version, date, command."""
     day = datetime.now(UTC).strftime('%Y-%m-%d')
     return [
-        f'Identified by disc_sim_ros {__version__} on {day} from {len(chosen.throws)} files:',
+        f'Identified by disc_sim_ros {__version__} on {day} from:',
         *(f'  {source}' for source in chosen.throws),
         f'Command: {chosen.prog} {shlex.join(words)}',
     ]
