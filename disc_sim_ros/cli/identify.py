@@ -166,7 +166,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
         aero=getattr(chosen, 'aero', None),
         air=flags.air_of(chosen),
     )
-    noise = _noise(chosen)
+    noise, free = _noise(chosen), _free(chosen)
     throws = _throws(chosen, setup)
     # Imported once the input is known to be right: they take a second.
     from disc_sim_ros.estimation import crossvalidation, identification, report  # noqa: PLC0415
@@ -180,7 +180,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     result = identification.identify(
         throws,
         setup,
-        free=_listed(chosen, 'free'),
+        free=free,
         prior=_prior(chosen),
         noise=noise,
         anyway=chosen.anyway,
@@ -322,6 +322,16 @@ def _releases(
         spin=chosen.release_spin_error,
     )
     return [(row.release, errors) for row in rows]
+
+
+def _free(chosen: argparse.Namespace) -> list[str] | None:
+    """Return the coefficients of `--free`, checked before anything is compiled."""
+    from disc_sim_ros.estimation import coefficients  # noqa: PLC0415
+
+    names = _listed(chosen, 'free')
+    if names is not None:
+        coefficients.chosen(names)
+    return names
 
 
 def _noise(chosen: argparse.Namespace) -> dict[str, float]:
