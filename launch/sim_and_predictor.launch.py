@@ -1,15 +1,21 @@
-"""Start sim_node and a predictor that follows it through noise.
+"""Start sim_node and a predictor that follows it through noise, and throw when it is ready.
 
 ros2 launch disc_sim_ros sim_and_predictor.launch.py sim.disc:=ultrastar noise:=0.02
 
-It takes all arguments of sim.launch.py. The predictor gets the positions and attitudes of `odom`,
-with noise on the positions.
+It takes all arguments of sim.launch.py except sim.auto_throw. The predictor gets the positions and
+attitudes of `odom`, with noise on the positions.
 """
 
 from pathlib import Path
+import sys
 
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
@@ -35,12 +41,13 @@ def generate_launch_description() -> LaunchDescription:
     ]
     simulator = IncludeLaunchDescription(
         PythonLaunchDescriptionSource(str(Path(__file__).with_name('sim.launch.py'))),
+        launch_arguments={'sim.auto_throw': 'false'}.items(),
     )
-    return LaunchDescription([*own, OpaqueFunction(function=predictor), simulator])
+    return LaunchDescription([*own, OpaqueFunction(function=predict_and_throw), simulator])
 
 
-def predictor(context: LaunchContext) -> list[Node]:
-    """Return the predictor of the simulator's disc; refuse misspelt arguments."""
+def predict_and_throw(context: LaunchContext) -> list[Node | ExecuteProcess]:
+    """Return the predictor of the disc and the program that throws; refuse misspelt arguments."""
     known = [*ARGUMENTS, *OF_SIMULATOR, *(argument_of(spec.name) for spec in TABLE)]
     refuse_unknown(context.argv, known, direct=is_started_directly(__file__))
     arguments = context.launch_configurations
@@ -53,12 +60,14 @@ def predictor(context: LaunchContext) -> list[Node]:
         'disc_uncertainty': 0.0,
     }
     files = [arguments['predictor_file']] if arguments['predictor_file'] else []
-    return [
-        Node(
-            package='disc_sim_ros',
-            executable='predictor_node',
-            namespace=arguments.get('namespace', ''),
-            parameters=[parameters, *files],
-            output='screen',
-        )
-    ]
+    namespace = arguments.get('namespace', '')
+    predictor = Node(
+        package='disc_sim_ros',
+        executable='predictor_node',
+        namespace=namespace,
+        parameters=[parameters, *files],
+        output='screen',
+    )
+    program = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_ready', '--predictor']
+    throw = ExecuteProcess(cmd=[*program, '--namespace', namespace], output='screen')
+    return [predictor, throw]

@@ -65,6 +65,6 @@ def record_and_throw(context: LaunchContext) -> list[Node | ExecuteProcess]:
     wait = float(arguments['throw_after'])
     if wait < 0.0:
         return [recorder]
-    program = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_recorded']
+    program = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_ready']
     options = ['--namespace', namespace, '--bag', bag, '--wait', str(wait)]
     return [recorder, ExecuteProcess(cmd=[*program, *options], output='screen')]

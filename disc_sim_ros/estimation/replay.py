@@ -10,7 +10,7 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import throw_csv
 from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
-from disc_sim_ros.physics.frames import paper_from_map, paper_quaternion, rotation_matrix
+from disc_sim_ros.physics.frames import flip, paper_from_map, paper_quaternion, rotation_matrix
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 
 ELLIPSE_PERIOD = 0.05  # s of measurements between two profiled ellipses
@@ -112,7 +112,7 @@ def fitted_flight(throw: FollowedThrow, config: PredictorConfig, rate: float) ->
     rows = np.empty((len(times), COLUMNS))
     rows[:, 0] = times - last.reference_time
     rows[:, 1:-3] = states
-    rows[:, -3:] = paper_from_map(np.array([*last.wind, -config.setup.wind.mean[2]]))
+    rows[:, -3:] = paper_from_map(np.array([*last.wind, flip(config.setup.wind.mean[2])]))
     return Trajectory(rows, config.setup.disc.diameter)
 
 

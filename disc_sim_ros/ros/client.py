@@ -125,6 +125,14 @@ class Watcher:
         recorded = f'{self._namespace}/{topics.ODOM}'
         self._wait(lambda: _has(bag, recorded), START, 'the first messages in the bag')
 
+    def wait_until_followed(self) -> None:
+        """Wait until a predictor follows `odom` of the simulator.
+
+        Raises:
+            DiscSimError: It takes too long, or a process ended.
+        """
+        self._wait(self._is_followed, START, 'the simulator and a predictor that follows odom')
+
     def pause(self, seconds: float) -> None:
         """Let wall time pass [s]."""
         self._spin(seconds)
@@ -198,6 +206,13 @@ class Watcher:
 
     def _newest_odometry(self) -> Odometry | None:
         return self._odometry
+
+    def _is_followed(self) -> bool:
+        """Return True if the simulator is there and a predictor has subscribed to `odom`."""
+        followers = self._node.get_subscriptions_info_by_topic(f'{self._namespace}/{topics.ODOM}')
+        return self._throw.service_is_ready() and any(
+            follower.node_name == 'predictor_node' for follower in followers
+        )
 
     def _is_ready(self) -> bool:
         """Return True if the simulator is there and all its topics have a recorder."""

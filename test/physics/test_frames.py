@@ -205,10 +205,9 @@ EXCEPTIONS = {
     ('paper/crosscheck.py', '-math.sin(yaw)'): 'the same',
     ('paper/crosscheck.py', '-launch.height'): 'the same',
     ('envs/steering.py', '0.0 - z'): 'from the disc to a target on the ground, a difference',
-    ('estimation/lift_coordinates.py', '-forward[:, 1]'): 'a vector at right angles, no turn',
-    ('estimation/prior.py', '-forward[:, 1]'): 'the same',
-    ('estimation/throw_estimator.py', '-forward[1]'): 'the same',
-    ('estimation/throw_estimator.py', '-Y'): 'the shortest rotation of one vector to another',
+    ('estimation/lift_coordinates.py', '-y'): 'a vector at right angles, no turn',
+    ('estimation/local.py', '-Y'): 'the shortest rotation of one vector to another',
+    ('estimation/prior.py', '-forward[:, 1]'): 'a vector at right angles, no turn',
     (
         'estimation/throw_fit.py',
         '-s.VY',

@@ -57,7 +57,7 @@ class PredictorNode(Node):
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        """Subscribe and compile; `start` begins to predict, while the node spins.
+        """Compile and subscribe; `start` begins to predict, while the node spins.
 
         Raises:
             ConfigError: A parameter is not allowed.
@@ -74,6 +74,10 @@ class PredictorNode(Node):
         self._throw = 0
         self._covariance = np.full((3, 3), np.nan)
         self.predictions = self.refused = 0
+        # Before topics exist: who sees them may throw.
+        if note := sampled.first_call_note():
+            self.get_logger().info(note)
+        self._warm_up()
 
         def publisher(kind: type, name: str) -> Any:
             return self.create_publisher(kind, name, STATE_QOS)
@@ -90,10 +94,6 @@ class PredictorNode(Node):
             for source in self._config.sources
         }
         parameters.refuse_unused(self)
-        note = sampled.first_call_note()
-        if note:
-            self.get_logger().info(note)
-        self._warm_up()
         self._thread = PollingThread(self._take, POLLING_PERIOD)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)

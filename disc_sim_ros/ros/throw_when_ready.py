@@ -1,4 +1,4 @@
-"""Throws the disc of a sim_node when a recorder records all its topics, for launch files."""
+"""Throws the disc of a sim_node when a recorder or a predictor is ready, for launch files."""
 
 import argparse
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from disc_sim_ros.errors import DiscSimError
 from disc_sim_ros.ros.client import Watcher
 from disc_sim_ros.ros.signals import exit_on_signal
 
-PROGRAM = 'throw_when_recorded'
+PROGRAM = 'throw_when_ready'
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -17,12 +17,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     exit_on_signal()  # nothing is open that would have to be closed
     p = argparse.ArgumentParser(prog=PROGRAM, description=__doc__)
     p.add_argument('--namespace', default='', help='namespace of both nodes')
-    p.add_argument('--bag', required=True, help='the folder that the recorder fills')
+    who = p.add_mutually_exclusive_group(required=True)
+    who.add_argument('--bag', help='the folder that a recorder of all topics fills')
+    who.add_argument('--predictor', action='store_true', help='a predictor_node follows odom')
     p.add_argument('--wait', type=float, default=0.0, help='wait so long in addition [s]')
     chosen = p.parse_args(arguments)
     try:
         watcher = Watcher(None, namespace=chosen.namespace)
-        watcher.wait_until_recorded(Path(chosen.bag), resume=False)
+        if chosen.predictor:
+            watcher.wait_until_followed()
+        else:
+            watcher.wait_until_recorded(Path(chosen.bag), resume=False)
         watcher.pause(chosen.wait)
         watcher.throw()
     except DiscSimError as error:

@@ -1,4 +1,4 @@
-"""The program of the launch file throws when a recorder records all topics, and not before."""
+"""The program of launch files throws when a recorder or a predictor is ready, and not before."""
 
 import signal
 import subprocess
@@ -9,15 +9,19 @@ import pytest
 pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from disc_sim_ros.analysis.flights import flights
 from disc_sim_ros.analysis.recording import discs
 from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.ros.processes import started
+from disc_sim_ros.topics import PredictorTopic
 from ros.recorder_process import Recorder
 from ros.sim.sim_messages import wall
 
 pytestmark = pytest.mark.ros
-COMMAND = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_recorded', '--bag']
+PROGRAM = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_ready']
+COMMAND = [*PROGRAM, '--bag']
 
 
 def test_it_throws_when_all_topics_are_recorded(ros, tmp_path):
@@ -44,6 +48,28 @@ def test_it_throws_when_all_topics_are_recorded(ros, tmp_path):
     assert flight.release is not None
     assert flight.landing is not None
     assert flight.starts_late < 0.006
+
+
+def test_it_throws_when_a_predictor_follows(ros, tmp_path):
+    """The first prediction belongs to the first flight."""
+    ros.start({'auto_throw': False})
+    events = ros.subscribe(DiagnosticStatus, 'flight_events')
+    landings = ros.subscribe(PoseWithCovarianceStamped, PredictorTopic.LANDING)
+    throw = subprocess.Popen([*PROGRAM, '--predictor'])
+    try:
+        ros.spin_until(wall(2.0))
+        assert throw.poll() is None  # there is no predictor yet
+        assert not events
+        parameters = {'sources': 'odom', 'disc': 'frisbee', 'disc_uncertainty': 0.0}
+        with started('predictor_node', parameters, tmp_path) as predictor:
+            ros.spin_until(lambda: throw.poll() is not None, 'the throw')
+            assert throw.returncode == 0
+            ros.spin_until(lambda: landings, 'a prediction')
+            ros.spin_until(lambda: len(events) > 1, 'the landing')
+            predictor.end()
+    finally:
+        throw.kill()
+        throw.wait()
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
