@@ -126,8 +126,9 @@ def test_quantities_of_a_flight():
 
 @pytest.mark.parametrize('speed', [0.0, 1e-320])
 def test_quantities_without_airspeed(speed):
+    """The square of 1e-320 m/s is 0: to the equations of motion that is no airspeed."""
     state = LEVEL._replace(VX=0.0, VY=0.0, VZ=speed)
-    assert messages.quantities(state, STILL, 0.275)[:4] == (speed, 0.0, 0.0, 0.0)
+    assert messages.quantities(state, STILL, 0.275)[:4] == (0.0, 0.0, 0.0, 0.0)
 
 
 # The IMU.
