@@ -159,6 +159,7 @@ def _record(
 ) -> None:
     """Fly and record one throw."""
     from disc_sim_ros.ros import client, processes  # noqa: PLC0415
+    from disc_sim_ros.ros.sim import compiled_loop  # noqa: PLC0415
 
     control = flags.control_of(chosen)
     parameters |= {'auto_throw': False, 'command_timeout': WHOLE_FLIGHT}
@@ -167,7 +168,7 @@ def _record(
         domain = stack.enter_context(processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='demo_')))
         progress.line(f'starting sim_node and recorder_node in ROS domain {domain}')
-        if text := flight.first_call_note():
+        if text := compiled_loop.first_call_note():
             progress.line(text)
         with signals.held():
             sim = stack.enter_context(processes.started('sim_node', parameters, folder))

@@ -88,7 +88,7 @@ def _observation(
             return Positions(t, paper_from_map(values))
         case 'camera':
             if instruments.camera_height is None:
-                allowed = f'throw {name} has no z_m, so a camera drew it: give the height of that'
+                allowed = f'{name} has no z_m, so a camera drew it: give the height of the camera'
                 raise ConfigError('camera_height', None, allowed, 'camera_height')
             points = paper_from_map(np.pad(values, ((0, 0), (0, 1))))[:, :2]
             return Camera(t, points, instruments.camera_height)

@@ -1,6 +1,9 @@
 """A page in a real browser: the disc flies and spins, at the size of a desktop and of a phone."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -43,12 +46,19 @@ def file(flights, tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope='module', params=SIZES)
-def opened(request, file):
-    width, height, phone = SIZES[request.param]
+@contextmanager
+def shown_at(size: str, file: Path) -> Iterator[browser.Browser]:
+    """Open a page of flights in a window of one of the SIZES; a phone is dark."""
+    width, height, phone = SIZES[size]
     with browser.Browser(width, height, phone=phone, dark=phone) as tab:
         tab.open(file)
         tab.wait('discView.ready')
+        yield tab
+
+
+@pytest.fixture(scope='module', params=SIZES)
+def opened(request, file):
+    with shown_at(request.param, file) as tab:
         yield tab
 
 

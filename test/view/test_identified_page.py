@@ -11,7 +11,7 @@ from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.physics.launch import Launch
-from view.test_browser import SIZES
+from view.test_browser import SIZES, shown_at
 
 pytest.importorskip('trimesh')
 pytestmark = pytest.mark.skipif(browser.program() is None, reason=browser.MISSING)
@@ -39,11 +39,8 @@ def file(trajectory, tmp_path_factory):
 @pytest.mark.parametrize('size', SIZES)
 def test_the_fitted_flight_flies_past_the_measured_points(file, trajectory, size):
     """The positions have no noise, so the fit is within a centimetre of them."""
-    width, height, phone = SIZES[size]
     places = map_from_paper(trajectory.position)
-    with browser.Browser(width, height, phone=phone, dark=phone) as tab:
-        tab.open(file)
-        tab.wait('discView.ready')
+    with shown_at(size, file) as tab:
         for k in (10, 60):
             tab.value(f'discView.play(false), discView.seek({trajectory.t[k]})')
             assert tab.value('discView.pose(0)')['position'] == pytest.approx(places[k], abs=0.01)

@@ -18,7 +18,7 @@ from disc_sim_ros.view import predicted, shown
 from disc_sim_ros.view.page import page
 from disc_sim_ros.view.system import SYSTEMS
 from estimation.synthetic_throws import throw
-from view.test_browser import SIZES, TWO_FRAMES, picture
+from view.test_browser import SIZES, TWO_FRAMES, picture, shown_at
 from view.test_page import data_of
 
 pytest.importorskip('trimesh')
@@ -57,10 +57,7 @@ def csv(flown, tmp_path):
 
 @pytest.fixture(scope='module', params=SIZES)
 def opened(request, file):
-    width, height, phone = SIZES[request.param]
-    with browser.Browser(width, height, phone=phone, dark=phone) as tab:
-        tab.open(file)
-        tab.wait('discView.ready')
+    with shown_at(request.param, file) as tab:
         yield tab
 
 
