@@ -139,6 +139,8 @@ def fit_release(
         normal = slopes.T @ weighted + root.T @ root
         gradient = weighted.T @ r + root.T @ problem.release_priors(k, here[n:])
         before = cost
+        if _promised(normal, gradient) < _SMALL:
+            break
         for _ in range(_MOST_TRIES):
             step = _solved(normal, -gradient, damping)
             tried = here.copy()
@@ -200,6 +202,10 @@ def solve(
             normal = normal + b.shared - b.mixed @ inverse @ b.mixed.T
             gradient = gradient + b.gradient - b.mixed @ (inverse @ b.own_gradient)
         before = cost
+        enough = _SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0)
+        whole = _within(x[:n], normal, gradient, 0.0, (low, high))
+        if -float(whole @ gradient) / 2.0 < enough:
+            break
         for _ in range(_MOST_TRIES):
             step = _within(x[:n], normal, gradient, damping, (low, high))
             tried = x.copy()
@@ -211,7 +217,7 @@ def solve(
                 x, cost, damping = tried, tried_cost, damping * 0.1
                 break
             damping = max(damping * 10.0, 1e-6)
-        if before - cost < _SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0):
+        if before - cost < enough:
             break
     keeper.offer(x, cost)
     return Solution(x, cost)
@@ -241,6 +247,11 @@ def _within(
     step = np.zeros_like(x)
     step[free] = _solved(normal[np.ix_(free, free)], -gradient[free], damping)
     return np.clip(x + step, low, high) - x
+
+
+def _promised(normal: FloatArray, gradient: FloatArray) -> float:
+    """Return the decrease of the cost that a Gauss-Newton step promises."""
+    return -0.5 * float(gradient @ _solved(normal, -gradient, 0.0))
 
 
 def _solved(normal: FloatArray, right: FloatArray, damping: float) -> FloatArray:

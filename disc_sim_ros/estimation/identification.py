@@ -3,26 +3,27 @@
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-import math
 import os
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import coefficients, information
+from disc_sim_ros.estimation import coefficients, information, profile
 from disc_sim_ros.estimation.coefficients import NAMES, Base, base_of
 from disc_sim_ros.estimation.fitting import (
     BETTER,
     Best,
     Progress,
     Solution,
+    fit_release,
     fitted_start,
     retry_releases,
     solve,
 )
 from disc_sim_ros.estimation.information import Unidentifiable
-from disc_sim_ros.estimation.observations import NOISE, UNITS
+from disc_sim_ros.estimation.noise import HOPELESS, estimated_noise, refuse_misfit
+from disc_sim_ros.estimation.observations import NOISE
 from disc_sim_ros.estimation.problem import FINEST, ROUGH, Prior, Problem
 from disc_sim_ros.estimation.throws import Throw
 from disc_sim_ros.physics.flight import Setup
@@ -32,11 +33,9 @@ from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import COEFFICIENT_SPREAD
 
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
-_NORMAL = 1.4826  # standard deviation over median of the absolute values, of normal numbers
-_WORST_FIT = 30.0  # times the usual noise of an instrument: beyond, it is no flight of such a disc
-_HOPELESS = 3.0  # times as far, with which a first fit is refused already
 _START_SPREAD = 0.5  # of the prior: how far other starts lie
 _START_STEPS = 12
+_PROFILES = 4  # at most: one may meet parameters that fit better
 _ROUNDS = 2  # of estimating the noise and fitting with it
 
 
@@ -49,6 +48,8 @@ class Identification:
         x: Its parameters, shape (p,).
         covariance: Of the parameters, shape (p, p).
         widening: Factor that the standard errors contain because residuals are correlated in time.
+        stretches: Factors that the standard errors of the free coefficients contain because the
+            sum of squares is no parabola, see `profile.Profile`.
         left_out: Coefficients that kept the value of the base disc, with the reasons.
         interrupted: Whether Ctrl-C ended the search: the best parameters so far.
         seed: Of the starts.
@@ -58,6 +59,7 @@ class Identification:
     x: FloatArray
     covariance: FloatArray
     widening: float
+    stretches: FloatArray
     left_out: tuple[Unidentifiable, ...]
     interrupted: bool
     seed: int
@@ -194,29 +196,34 @@ def identify(
         rough = replace(problem, margin=ROUGH)
         x = _from_starts(rough, x, _Search(starts, seed, best, progress)).x
         given = set(noise or {})
-        _refuse_misfit(problem, _noise(rough, x, given), given, _HOPELESS)
+        refuse_misfit(problem, estimated_noise(rough, x, given), given, HOPELESS)
         problem, x, left_out = _identifiable(problem, x, refuse=free is not None, anyway=anyway)
         best = Best(x)
         solution = solve(problem, x, best=best, progress=progress, stage='fit')
         problem, x = _without_each(problem, solution, progress)
         best = Best(x)
         for number in range(_ROUNDS):
-            estimated = _noise(problem, x, given)
+            estimated = estimated_noise(problem, x, given)
             changed = max(abs(estimated[kind] / problem.noise[kind] - 1.0) for kind in estimated)
-            _refuse_misfit(problem, estimated, given)
+            refuse_misfit(problem, estimated, given)
             if number > 0 and changed < _SAME_NOISE:
                 break
             noises = {**problem.noise, **estimated}
             problem = replace(problem, margin=FINEST, noise=noises)
             best = Best(x)
             x = solve(problem, x, best=best, progress=progress, stage='noise').x
+        best = Best(x)
+        x, stretches = _profiled(problem, x, best, progress)
     except KeyboardInterrupt:
         if not best.x.size or best.x.size != problem.size:
             raise
         interrupted, x = True, best.x
+        stretches = np.ones(len(problem.free))
     known = information.information(problem, x)
+    factors = np.concatenate([stretches, np.ones(problem.size - len(stretches))])
+    covariance = known.covariance() * np.outer(factors, factors)
     return Identification(
-        problem, x, known.covariance(), known.widening, tuple(left_out), interrupted, seed
+        problem, x, covariance, known.widening, stretches, tuple(left_out), interrupted, seed
     )
 
 
@@ -228,6 +235,7 @@ def stages(throws: int, starts: int) -> tuple[str, ...]:
         'fit',
         *(_without_stage(k, throws) for k in range(throws if throws > 1 else 0)),
         'noise',
+        profile.STAGE,
     )
 
 
@@ -315,11 +323,27 @@ def _without_each(
         ).x[: problem.shared]
         tried = x.copy()
         tried[: problem.shared] = shared
-        other, tried, _ = retry_releases(problem, tried, (k,))
+        tried[problem.own(k)] = fit_release(problem, k, problem.here(k, tried))[0][len(shared) :]
+        other, tried, better = retry_releases(problem, tried, (k,))
+        if not better:
+            continue
         again = solve(other, tried, most_steps=_START_STEPS, progress=progress, stage=stage)
         if again.cost < cost - BETTER:
             problem, x, cost = other, again.x, again.cost
     return problem, x
+
+
+def _profiled(
+    problem: Problem, x: FloatArray, best: Best, progress: Progress | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the best parameters and the stretches of the standard errors."""
+    for _ in range(_PROFILES):
+        curvature = information.information(problem, x).white_covariance()
+        result = profile.profiled(problem, x, curvature, progress)
+        if result.better is None:
+            break
+        x = solve(problem, result.better, best=best, progress=progress, stage='noise').x
+    return x, result.stretches
 
 
 def _identifiable(
@@ -345,43 +369,3 @@ def _identifiable(
         problem = replace(problem, free=information.without(problem, [worst.name]))
         x = np.delete(x, place)
     return problem, x, left_out
-
-
-def _noise(problem: Problem, x: FloatArray, given: set[str]) -> dict[str, float]:
-    """Return the noise of each instrument whose noise was not given, from the residuals.
-
-    Residuals of a fit are smaller than the noise, because its parameters follow some of it.
-    """
-    by_kind: dict[str, list[FloatArray]] = {}
-    fitted = information.information(problem, x).fitted
-    for k, throw in enumerate(problem.throws):
-        here = problem.here(k, x)[np.newaxis]
-        for o, r in zip(throw.observations, problem.predictions(k, here), strict=True):
-            by_kind.setdefault(o.kind, []).append(r.ravel())
-    count = sum(len(r) for every in by_kind.values() for r in every)
-    factor = _NORMAL * math.sqrt(count / max(count - fitted, 1.0))
-    return {
-        kind: problem.noise[kind]
-        if kind in given
-        else max(factor * float(np.median(np.abs(np.concatenate(r)))), 1e-9)
-        for kind, r in by_kind.items()
-    }
-
-
-def _refuse_misfit(
-    problem: Problem, estimated: Mapping[str, float], given: set[str], margin: float = 1.0
-) -> None:
-    """Refuse measurements that no disc like the base disc gives.
-
-    Raises:
-        ConfigError: The residuals are far larger than the noise of any such instrument.
-    """
-    for kind, sigma in estimated.items():
-        if kind not in given and sigma > margin * _WORST_FIT * NOISE[kind]:
-            raise ConfigError(
-                kind,
-                f'{sigma:.3g} {UNITS[kind]}',
-                f'the best fit of a disc like {problem.base.disc.name} leaves this residual; more '
-                f'than {_WORST_FIT * NOISE[kind]:.3g} {UNITS[kind]} is another disc, another unit '
-                'or no flight of a disc',
-            )

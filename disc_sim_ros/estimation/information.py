@@ -67,6 +67,10 @@ class Information:
         """Return the covariance of the parameters, shape (p, p)."""
         return _inverse(self.data / self.widening**2 + self.priors)
 
+    def white_covariance(self) -> FloatArray:
+        """Return the covariance as if residuals were not correlated in time, shape (p, p)."""
+        return _inverse(self.data + self.priors)
+
 
 def information(problem: Problem, x: FloatArray) -> Information:
     """Return the information at the parameters `x`."""

@@ -17,6 +17,7 @@ from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.disc_file import disc_document
 from disc_sim_ros.quantities import COEFFICIENTS
 
+_STRETCHED = 1.2  # factor of a standard error from which on the report names it
 _GOOD = 0.1  # of the spread or of the value: what counts as known well
 _OFFSETS = {'C_L0': 'lift_offset', 'C_D0': 'drag_offset', 'C_M0': 'pitching_offset'}
 
@@ -51,6 +52,16 @@ def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
         lines.append(
             f'  residuals are correlated in time: something is not modelled; standard errors are '
             f'{result.widening:.1f} times those of white noise'
+        )
+    wider = [
+        f'{problem.names[i]} {factor:.1f} times'
+        for i, factor in enumerate(result.stretches)
+        if factor > _STRETCHED
+    ]
+    if wider:
+        lines.append(
+            '  standard errors are wider than the curvature at the best fit says, because values '
+            f'far away fit nearly as well: {", ".join(wider)}'
         )
     for throw, miss in zip(problem.throws, left_out, strict=False):
         if miss.from_path is not None:
@@ -156,6 +167,10 @@ def document(result: Identification, left_out: Sequence[LeftOut]) -> dict[str, A
             for kind in sorted({o.kind for throw in problem.throws for o in throw.observations})
         },
         'widening': result.widening,
+        'stretches': {
+            NAMES[i]: float(factor)
+            for i, factor in zip(problem.free, result.stretches, strict=True)
+        },
         'left_out': [one.reason for one in result.left_out],
         'miss_without_m': {
             throw.name: asdict(miss) for throw, miss in zip(problem.throws, left_out, strict=False)

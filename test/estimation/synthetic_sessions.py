@@ -117,7 +117,21 @@ def session(
     count: int,
     spin_error: float | None = None,
 ) -> list[Throw]:
-    """Return throws of one disc as instruments measure them.
+    """Return the throws of `thrown` without their releases."""
+    pairs = thrown(values, setup, kinds, generator, count=count, spin_error=spin_error)
+    return [throw for throw, _ in pairs]
+
+
+def thrown(
+    values: FloatArray,
+    setup: Setup,
+    kinds: Sequence[str],
+    generator: np.random.Generator,
+    *,
+    count: int,
+    spin_error: float | None = None,
+) -> list[tuple[Throw, Launch]]:
+    """Return throws of one disc as instruments measure them, each with its true release.
 
     Args:
         values: Coefficients of the disc, in the order of `coefficients.NAMES`, shape (9,).
@@ -144,5 +158,5 @@ def session(
         spin = None
         if spin_error is not None:
             spin = launch.spin + spin_error * generator.standard_normal()
-        throws.append(throw_of(f'throw {k + 1}', made, disc, spin=spin))
+        throws.append((throw_of(f'throw {k + 1}', made, disc, spin=spin), launch))
     return throws
