@@ -131,7 +131,7 @@ def follow(
         mark = next((x for x in MARKS if abs(m.time - x) < 0.4 / RATE), None)
         predictor.add(m)
         begin = time.process_time()
-        prediction = predictor.update(profiled=mark is not None) or prediction
+        prediction = predictor.update(ellipse=mark is not None) or prediction
         times[mark is not None].append(time.process_time() - begin)
         if mark is None or prediction is None:
             continue
@@ -169,7 +169,7 @@ def bound(model: Model, t: Throw, data: Measurements, seed: int) -> float:
     true = Estimate(t.state, np.array([t.row[AT[name]] for name in model.prior.constants]))
     small = np.diag(np.full(model.unknowns - POSITION, 1e-3))
     exact = replace(data, position=paper_from_map(t.exact[: len(data.time)]))
-    linear, _, _ = linearised(model, true, small, exact)
+    linear, _, _ = linearised(model, true, small, exact, to_landing=True)
     covariance = (linear.landing @ linear.covariance @ linear.landing.T)[:2, :2]
     rng = np.random.default_rng([seed, 2])
     draws = rng.multivariate_normal(np.zeros(2), covariance, 99)

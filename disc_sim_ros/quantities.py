@@ -456,6 +456,10 @@ PREDICTOR_NODE = _table(
         'intercept_height', 'm', -1000.0, 10000.0, 1.0,
         'Height, z in `map`, at which `intercept` is on the way down',
     ),
+    Quantity(
+        'intercept_plane_normal', '', -1000.0, 1000.0, 0.0,
+        'Normal of the plane in which `intercept` is; 0: its height counts',
+    ),
 )  # fmt: skip
 
 # The page of the running simulator.

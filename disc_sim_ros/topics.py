@@ -90,6 +90,7 @@ class PredictorTopic:
     ELLIPSE = 'landing_ellipse'
     INTERCEPT = 'intercept'
     WIND = 'estimated_wind'
+    DISC_WEIGHTS = 'disc_weights'
 
 
 class NodeTopic:

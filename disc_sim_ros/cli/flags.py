@@ -42,10 +42,11 @@ _GIVEN_BY = {
 }
 
 
-class _Discs(argparse.Action):
+class Discs(argparse.Action):
     """Collects the values of several `--disc` in `discs`; `disc` is the first."""
 
     def __call__(self, _: object, chosen: argparse.Namespace, value: Any, *__: object) -> None:
+        """Add a value."""
         chosen.discs = [*getattr(chosen, 'discs', ()), value]
         chosen.disc = chosen.discs[0]
 
@@ -56,7 +57,7 @@ def add_disc(p: Parser, *, several: bool = False) -> None:
     what.add_argument(
         '--disc',
         type=path,
-        action=_Discs if several else 'store',
+        action=Discs if several else 'store',
         default=disc_file.DEFAULT_DISC,
         metavar='NAME|FILE.yaml|NUMBERS',
         help=f'{", ".join(disc_file.disc_names())}, your own file, or flight numbers: 11/5/-1/3'

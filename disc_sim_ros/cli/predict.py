@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from disc_sim_ros import __version__
 from disc_sim_ros.cli import output, pages
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
+from disc_sim_ros.cli.flags import Discs
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file
@@ -47,9 +48,10 @@ def parser(prog: str = 'predict') -> Parser:
     p.add_argument(
         '--disc',
         type=path,
+        action=Discs,
         default='ultrastar',
         metavar='NAME|FILE.yaml|NUMBERS',
-        help='the disc, as for fly',
+        help='the disc, as for fly; give it several times where it is not known which was thrown',
     )
     for name, quantity in PREDICTION.items():
         add_quantity(p, _FLAGS[name], quantity)
@@ -72,15 +74,15 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'predict') -> int:
 
 
 def _run(chosen: argparse.Namespace) -> int:
-    from disc_sim_ros.estimation.replay import replay  # noqa: PLC0415 - not for --help
-    from disc_sim_ros.physics import sampled  # noqa: PLC0415
+    from disc_sim_ros.estimation.predictor import first_call_note  # noqa: PLC0415 - not for --help
+    from disc_sim_ros.estimation.replay import replay  # noqa: PLC0415
 
     plot = getattr(chosen, 'plot', None)
     if plot is not None:
         output.check_plot(plot)
     config = _config(chosen)
     series = _measurements(chosen)
-    note = sampled.first_call_note()
+    note = first_call_note()
     if note:
         output.note(chosen.prog, note)
     throws = replay(series, config)
@@ -88,10 +90,10 @@ def _run(chosen: argparse.Namespace) -> int:
         count = sum(len(measurements) for measurements in series)
         raise DiscSimError(f'{chosen.source}: no throw in {count} measurements')
     if chosen.json:
-        document = {'throws': [_document(throw) for throw in throws]}
+        document = {'throws': [_document(throw, config.discs) for throw in throws]}
         output.show(json.dumps(document, allow_nan=False))
     else:
-        output.show('\n\n'.join(_summary(throw) for throw in throws))
+        output.show('\n\n'.join(_summary(throw, config.discs) for throw in throws))
     if plot is not None:
         output.write_plot(plot, _figure(throws))
     if pages.is_wanted(chosen):  # after the numbers: they come even if it cannot be written
@@ -120,8 +122,10 @@ def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
     from disc_sim_ros.physics.flight import Setup  # noqa: PLC0415
     from disc_sim_ros.physics.frames import flip_yz  # noqa: PLC0415
 
-    setup = Setup(disc=disc_file.load_disc(chosen.disc), wind=Wind(mean=flip_yz(chosen.wind)))
-    return predictor_config(setup, {name: getattr(chosen, name) for name in PREDICTION})
+    wind = Wind(mean=flip_yz(chosen.wind))
+    names = getattr(chosen, 'discs', [chosen.disc])
+    setups = [Setup(disc=disc_file.load_disc(name), wind=wind) for name in names]
+    return predictor_config(setups, {name: getattr(chosen, name) for name in PREDICTION})
 
 
 def _measurements(chosen: argparse.Namespace) -> 'list[list[Measurement]]':
@@ -176,7 +180,7 @@ def _rows(throw: 'FollowedThrow') -> list[dict[str, float]]:
     return rows
 
 
-def _document(throw: 'FollowedThrow') -> dict[str, Any]:
+def _document(throw: 'FollowedThrow', discs: Sequence[str]) -> dict[str, Any]:
     x, y, time = throw.landing
     last = throw.predictions[-1]
     return {
@@ -186,11 +190,12 @@ def _document(throw: 'FollowedThrow') -> dict[str, Any]:
         'time_of_flight_s': float(time) - last.reference_time,
         'to_the_landing': throw.is_complete,
         'wind_m_s': [float(w) for w in last.wind],
+        'disc_weights': dict(zip(discs, last.weights.tolist(), strict=True)),
         'predictions': _rows(throw),
     }
 
 
-def _summary(throw: 'FollowedThrow') -> str:
+def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
     x, y, time = throw.landing
     last = throw.predictions[-1]
     lines = [
@@ -207,6 +212,9 @@ def _summary(throw: 'FollowedThrow') -> str:
         for r in _rows(throw)
     ]
     lines.append(f'  estimated wind {last.wind[0]:.1f}, {last.wind[1]:.1f} m/s')
+    if len(discs) > 1:
+        likely = sorted(zip(discs, last.weights, strict=True), key=lambda pair: -pair[1])
+        lines.append('  disc: ' + ', '.join(f'{name} {100 * w:.1f} %' for name, w in likely))
     return '\n'.join(lines)
 
 

@@ -7,22 +7,20 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import local, throw_detection
+from disc_sim_ros.estimation import lanes, local, throw_detection
+from disc_sim_ros.estimation.disc_choice import DiscChoice
 from disc_sim_ros.estimation.prior import ThrowPrior
-from disc_sim_ros.estimation.throw_estimator import ThrowEstimator
-from disc_sim_ros.estimation.throw_fit import Estimate, Fitted, Measurements, Model
-from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.estimation.throw_fit import Estimate, Fitted, Linear, Measurements, Model
+from disc_sim_ros.physics.flight import SLOWING, Setup
 from disc_sim_ros.physics.frames import map_from_paper, paper_from_map
+from disc_sim_ros.physics.kernels.jit import note_before
 from disc_sim_ros.physics.kernels.rows import AT
+from disc_sim_ros.physics.kernels.sampling import sample_simd
+from disc_sim_ros.physics.kernels.tracking import track_simd
 from disc_sim_ros.physics.sampled import fly_sampled
 
 MOST_MEASUREMENTS = 600  # of one throw; of more, every second of the older half is left out
 STEP = 0.02  # s; without nutation within 26 mm, 0.2 mm in the median (docs/predictor.md)
-MODEL = 'precession'  # nutation cannot be followed over a flight: its phase is lost
-# Factor of the covariance of a landing where no attitude was measured. The profile finds too
-# little of the curved range of winds and attitudes that fit. With this factor nine of ten landings
-# of about 40 throws lay in the ellipse, without it 76 % (docs/predictor.md).
-WITHOUT_ATTITUDE = 2.0
 MORE = 4  # Gauss-Newton steps before a throw is taken to have ended
 _ORDER = 1e-9  # s between two measurements
 _BACK = 1.0  # s by which time is set back, not a late measurement
@@ -35,6 +33,7 @@ class PredictorConfig:
     Attributes:
         setup: Disc, air, profile of the wind and ground contact. Its model and step are replaced.
         prior: Release, wind and uncertainty of the disc.
+        others: Setups and priors with other discs that may have been thrown.
         position_sigma: Standard deviation of each coordinate of a position [m].
         attitude_sigma: Standard deviation of the disc's axis in each direction [rad].
         duration: Longest flight [s].
@@ -43,15 +42,29 @@ class PredictorConfig:
 
     setup: Setup
     prior: ThrowPrior = field(default_factory=ThrowPrior)
+    others: tuple[tuple[Setup, ThrowPrior], ...] = ()
     position_sigma: float = 0.02
     attitude_sigma: float = math.radians(2.0)
     duration: float = 15.0
     ground_height: float = 0.0
 
     @property
-    def model(self) -> Model:
-        """Return the model of the throws."""
-        return Model(replace(self.setup, model=MODEL), self.prior, STEP, self.duration)
+    def models(self) -> tuple[Model, ...]:
+        """Return the model of the throws of each disc."""
+        return tuple(
+            Model(replace(setup, model=SLOWING), prior, STEP, self.duration)
+            for setup, prior in ((self.setup, self.prior), *self.others)
+        )
+
+    @property
+    def setups(self) -> tuple[Setup, ...]:
+        """Return the setup with each disc."""
+        return self.setup, *(setup for setup, _ in self.others)
+
+    @property
+    def discs(self) -> tuple[str, ...]:
+        """Return the names of the discs."""
+        return tuple(setup.disc.name for setup in self.setups)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +100,13 @@ class Prediction:
 
     Attributes:
         throw: Number of the throw, from 1.
+        disc: Place of the most likely disc in `PredictorConfig.discs`; what follows is of it.
+        weights: Probability of each disc, shape (discs,).
         time: Of the newest measurement [s].
         landing_time: By the clock of the measurements [s].
         landing: x, y of the landing [m], shape (2,).
-        covariance: Of x, y [m] and time [s] of the landing, shape (3, 3); nan if it was not asked.
+        covariance: Of x, y [m] and time [s] of the landing about this one, of all discs, shape
+            (3, 3); nan if it was not asked, or too few likely throws land.
         state: State at `time`, paper's axes, shape (14,), its Z over the ground.
         state_covariance: Of its position and velocity, in `map`, shape (6, 6).
         wind: Estimated velocity of the air, x and y [m/s].
@@ -101,6 +117,8 @@ class Prediction:
     """
 
     throw: int
+    disc: int
+    weights: FloatArray
     time: float
     landing_time: float
     landing: FloatArray
@@ -128,12 +146,28 @@ class Predictor:
     def __init__(self, config: PredictorConfig) -> None:
         """Wait for a throw."""
         self._config = config
-        self._model = config.model
-        self._estimator: ThrowEstimator | None = None
-        self._rows: list[FloatArray] = []  # time, position, sigma, axis; ascending
+        self._models = config.models
+        self._estimator: DiscChoice | None = None
+        self._rows = _NO_ROWS  # time, position, sigma, axis; ascending
         self._new = False
         self.throws = 0
         self.late = 0
+
+    def warm_up(self) -> None:
+        """Load or compile all that an update needs, so that no measurement waits for it."""
+        time = np.linspace(0.0, 0.1, 8)
+        made_up = Measurements(
+            time=time,
+            position=np.outer(time, [15.0, 0.0, 0.0]) + np.array([0.0, 0.0, -1.0]),
+            sigma=np.full(8, 0.02),
+            axis=np.tile([0.0, 0.0, 1.0], (8, 1)),
+            axis_sigma=np.full(8, 0.1),
+        )
+        of_each = DiscChoice(self._models)
+        of_each.update(made_up)
+        of_each.landing_covariance()
+        prediction = self._prediction(of_each, made_up, start=0.0, ellipse=False)
+        self.path(prediction, 10.0)
 
     @property
     def is_following(self) -> bool:
@@ -143,35 +177,31 @@ class Predictor:
     @property
     def newest(self) -> float:
         """Return the time of the newest measurement [s]; -inf before the first."""
-        return float(self._rows[-1][0]) if self._rows else -math.inf
+        return float(self._rows[-1, 0]) if len(self._rows) else -math.inf
 
     def reset(self) -> None:
         """Forget the throw and its measurements."""
-        self._estimator, self._rows, self._new = None, [], False
+        self._estimator, self._rows, self._new = None, _NO_ROWS, False
 
     def add(self, m: Measurement) -> bool:
         """Take a measurement, in any order; return False if it came too late or twice."""
-        if self._rows and m.time < self._rows[-1][0] - _BACK:
+        if m.time < self.newest - _BACK:
             self.reset()  # the clock was set back
-        place = len(self._rows)
-        while place and self._rows[place - 1][0] > m.time:
-            place -= 1
-        twice = place and m.time - self._rows[place - 1][0] < _ORDER
+        times = self._rows[:, 0]
+        place = int(np.searchsorted(times, m.time, side='right'))
+        twice = place and m.time - times[place - 1] < _ORDER
         if twice or (place == 0 and self._estimator is not None):
             self.late += 1
             return False
-        self._rows.insert(place, self._row(m))
+        rows = np.concatenate([self._rows[:place], self._row(m)[None], self._rows[place:]])
         self._new = True
         if self._estimator is None:
-            self._rows = self._rows[throw_detection.first_of_window(self._times()) :]
-        elif len(self._rows) > MOST_MEASUREMENTS:
-            half = len(self._rows) // 2
-            self._rows = self._rows[:half:2] + self._rows[half:]
+            rows = rows[throw_detection.first_of_window(rows[:, 0]) :]
+        elif len(rows) > MOST_MEASUREMENTS:
+            half = len(rows) // 2
+            rows = np.concatenate([rows[:half:2], rows[half:]])
+        self._rows = rows
         return True
-
-    def _times(self) -> FloatArray:
-        """Return the times of the measurements that are kept [s]."""
-        return np.array([row[0] for row in self._rows])
 
     def _row(self, m: Measurement) -> FloatArray:
         x, y, z = m.position
@@ -182,12 +212,11 @@ class Predictor:
             axis = -paper_from_map(np.array(m.axis) / math.hypot(*m.axis))
         return np.array([m.time, *at, sigma, *axis])
 
-    def update(self, *, profiled: bool = True) -> Prediction | None:
+    def update(self, *, ellipse: bool = True) -> Prediction | None:
         """Return the prediction from all measurements so far.
 
         Args:
-            profiled: With the covariance of the landing from a profile; else from the linear fit,
-                which is too small with positions only, in a fraction of the time.
+            ellipse: With the covariance of the landing, which takes longer than all else.
 
         Returns:
             The prediction; None while no throw is in the air, or without new measurements.
@@ -200,7 +229,7 @@ class Predictor:
             first = throw_detection.beginning(data.time, data.position, data.sigma)
             if first is None:
                 return None
-            self._estimator = ThrowEstimator(self._model)
+            self._estimator = DiscChoice(self._models)
             self.throws += 1
             self._rows = self._rows[first:]
             data = self._measurements()
@@ -210,10 +239,11 @@ class Predictor:
             return None
         if not np.isfinite(fitted.landing).all():
             return None
-        return self._prediction(self._estimator, data, profiled=profiled)
+        start = float(self._rows[0, 0])
+        return self._prediction(self._estimator, data, start, ellipse=ellipse)
 
     def _measurements(self) -> Measurements:
-        rows = np.array(self._rows)
+        rows = self._rows
         return Measurements(
             time=rows[:, 0] - rows[0, 0],
             position=rows[:, 1:4],
@@ -223,40 +253,26 @@ class Predictor:
         )
 
     def _prediction(
-        self, estimator: ThrowEstimator, data: Measurements, *, profiled: bool
-    ) -> Prediction | None:
-        fitted, linear = estimator.fitted, estimator.linear
-        if fitted is None or linear is None:
-            return None
-        names = list(self._model.prior.constants)
-        wind, spread = np.zeros(2), np.zeros((2, 2))
-        first = len(self._model.coordinates)
-        of_wind = {}
-        for i, name in enumerate(('wind_x', 'wind_y')):
-            wind[i] = self._model.row[AT[name]]
-            if name in names:
-                of_wind[i] = first + names.index(name)
-                wind[i] = fitted.estimate.constants[names.index(name)]
-        for i, a in of_wind.items():
-            for j, b in of_wind.items():
-                spread[i, j] = linear.covariance[a, b]
-        turn = np.diag([*map_from_paper(np.ones(3))[:2], 1.0])  # X, Y, time to x, y, time
-        covariance = turn @ estimator.landing_covariance(profiled=profiled) @ turn
-        if not data.has_axis:
-            covariance = WITHOUT_ATTITUDE * covariance
-        squared = np.sum(fitted.measured[:, :3] ** 2, axis=1)
-        start = float(self._rows[0][0])
+        self, estimator: DiscChoice, data: Measurements, start: float, *, ellipse: bool
+    ) -> Prediction:
+        fitted, linear, model = estimator.fitted, estimator.linear, self._models[estimator.best]
+        wind, spread = _wind(model, fitted.estimate, linear)
+        covariance = np.full((3, 3), np.nan)
+        if ellipse:
+            covariance = _TURN @ estimator.landing_covariance() @ _TURN
         return Prediction(
             throw=self.throws,
+            disc=estimator.best,
+            weights=estimator.weights.copy(),
             time=start + float(data.time[-1]),
             landing_time=start + float(fitted.landing[2]),
             landing=map_from_paper([fitted.landing[0], fitted.landing[1], 0.0])[:2] + 0.0,
             covariance=covariance,
-            state=fitted.states[-1],
+            state=fitted.last,
             state_covariance=_TO_MAP @ linear.now @ linear.covariance @ linear.now.T @ _TO_MAP,
             wind=wind,
             wind_covariance=spread,
-            used=float(np.mean(squared < _FULL)),
+            used=float(np.mean(fitted.squares[:, 0] < _FULL)),
             flight=fitted.estimate,
             reference_time=start,
         )
@@ -276,27 +292,50 @@ class Predictor:
         end = prediction.landing_time - prediction.reference_time
         times = np.arange(begin, end, 1.0 / rate)
         times = np.append(times[times < end], end)  # arange may go a rounding error too far
-        flight = prediction.flight
+        flight, model = prediction.flight, self._models[prediction.disc]
         flown = fly_sampled(
             flight.state[None],
-            self._model.rows(flight.constants[None]),
-            self._model.setup,
+            model.rows(flight.constants[None]),
+            model.setup,
             times,
-            step=self._model.step,
+            step=model.step,
             duration=0.0,
         )
         return prediction.reference_time + times, flown.states[0]
 
 
 _TO_MAP = np.diag(np.tile(map_from_paper(np.ones(3)), 2))
+_TURN = np.diag([*map_from_paper(np.ones(3))[:2], 1.0])  # X, Y, time to x, y, time
+_NO_ROWS = np.empty((0, 8))
+
+
+def _wind(model: Model, estimate: Estimate, linear: Linear) -> tuple[FloatArray, FloatArray]:
+    """Return the velocity of the air in `map`, x and y [m/s], and its covariance."""
+    wind, spread = np.zeros(2), np.zeros((2, 2))
+    names, first = list(model.prior.constants), len(model.coordinates)
+    unknown = {}
+    for i, name in enumerate(('wind_x', 'wind_y')):
+        wind[i] = model.row[AT[name]]
+        if name in names:
+            unknown[i] = first + names.index(name)
+            wind[i] = estimate.constants[names.index(name)]
+    for i, a in unknown.items():
+        for j, b in unknown.items():
+            spread[i, j] = linear.covariance[a, b]
+    return wind, spread
 
 
 def _has_ended(fitted: Fitted, data: Measurements) -> bool:
     now, landing = float(data.time[-1]), float(fitted.landing[2])
-    return throw_detection.has_ended(now, landing, fitted.measured, data.position)
+    return throw_detection.has_ended(now, landing, fitted.squares[:, 0], data.position)
 
 
 _FULL = 20.0  # squared residual at which a weight is one half
+
+
+def first_call_note() -> str:
+    """Return one line for users on why the first update takes long; '' if it does not."""
+    return note_before(track_simd, sample_simd, lanes.normal_equations, seconds=50)
 
 
 def up_axis(states: FloatArray) -> FloatArray:

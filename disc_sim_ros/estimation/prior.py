@@ -7,15 +7,15 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.local import disc_axis
+from disc_sim_ros.estimation import lanes
 from disc_sim_ros.physics.disc import Disc
-from disc_sim_ros.physics.frames import flip
 
 # Standard deviations of the offsets of a disc whose file states none: about as discs of one kind
 # differ in one wind tunnel (docs/discs.md).
 DISC_OFFSETS = {'lift_offset': 0.02, 'drag_offset': 0.008, 'pitching_offset': 0.003}
-ROLLING_OFFSET = 0.002  # the same of the rolling moment, which a file cannot state
-_HORIZONTAL = 1e-3  # share of the speed below which a path counts as vertical
+# The same of the rolling moment, which a file cannot state: at the spin of a throw that due to
+# spin was measured to be up to this size (`ultrastar`), and most discs have no table of it.
+ROLLING_OFFSET = 0.004
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,27 +77,17 @@ class ThrowPrior:
         Returns:
             Shape (n, 7).
         """
-        pairs = zip(manner(states).T, self._of_state, strict=True)
-        return np.stack([(x - g.mean) / g.sigma for x, g in pairs], axis=1)
-
-    @property
-    def _of_state(self) -> tuple[Gaussian, ...]:
-        return (self.speed, self.climb, self.nose, self.bank, self.rate, self.rate, self.spin)
+        every = (self.speed, self.climb, self.nose, self.bank, self.rate, self.rate, self.spin)
+        means, sigmas = np.array([(g.mean, g.sigma) for g in every]).T
+        residuals: FloatArray = (manner(states) - means) / sigmas
+        return residuals
 
 
 def manner(states: FloatArray) -> FloatArray:
     """Return speed, climb, nose, bank, p, q and spin of states, shape (n, 7), from (n, 14)."""
-    velocity = states[:, 3:6]
-    speed = np.maximum(np.sqrt(np.sum(velocity**2, axis=1)), 1e-6)
-    forward = velocity / speed[:, None]
-    level = np.maximum(np.hypot(forward[:, 0], forward[:, 1]), _HORIZONTAL)
-    right = np.stack([-forward[:, 1], forward[:, 0], np.zeros(len(states))], axis=1)
-    right /= level[:, None]
-    down = disc_axis(states)
-    nose = np.arcsin(np.clip(np.sum(down * forward, axis=1), -1.0, 1.0))
-    bank = -np.arcsin(np.clip(np.sum(down * right, axis=1), -1.0, 1.0))
-    climb = np.arctan2(flip(forward[:, 2]), level)
-    return np.column_stack([speed, climb, nose, bank, states[:, 10:13]])
+    out = np.empty((len(states), lanes.MANNER))
+    lanes.manners(np.ascontiguousarray(states), out)
+    return out
 
 
 def disc_offsets(disc: Disc, factor: float = 1.0) -> dict[str, Gaussian]:

@@ -13,7 +13,7 @@ from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor
 from disc_sim_ros.physics.frames import flip, paper_from_map, paper_quaternion, rotation_matrix
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 
-ELLIPSE_PERIOD = 0.05  # s of measurements between two profiled ellipses
+ELLIPSE_PERIOD = 0.05  # s of measurements between two ellipses
 _SHORTEST_QUATERNION = 1e-6
 
 
@@ -23,7 +23,7 @@ class FollowedThrow:
 
     Attributes:
         number: From 1.
-        predictions: In the order of the measurements. Each has the covariance of the last profiled
+        predictions: In the order of the measurements. Each has the covariance of the last
             ellipse, as `predictor_node` publishes it.
         measurements: Those from the beginning of the throw to the last prediction.
     """
@@ -77,15 +77,14 @@ def _replayed(
     predictor = Predictor(config)
     throws: dict[int, list[Prediction]] = {}
     every: list[Measurement] = []
-    last_profile, covariance = -np.inf, np.full((3, 3), np.nan)
+    last, covariance = -np.inf, np.full((3, 3), np.nan)
     for m in measurements:
         every.append(m)
         predictor.add(m)
-        profiled = not last_profile <= m.time < last_profile + ELLIPSE_PERIOD
-        prediction = predictor.update(profiled=profiled)
+        prediction = predictor.update(ellipse=not last <= m.time < last + ELLIPSE_PERIOD)
         if prediction is not None:
-            if profiled:
-                last_profile, covariance = m.time, prediction.covariance
+            if np.isfinite(prediction.covariance).all():
+                last, covariance = m.time, prediction.covariance
             prediction = replace(prediction, covariance=covariance)
             throws.setdefault(prediction.throw, []).append(prediction)
     return [
@@ -107,13 +106,14 @@ def fitted_flight(throw: FollowedThrow, config: PredictorConfig, rate: float) ->
         the first measurement; the wind is the estimated one.
     """
     last = throw.predictions[-1]
+    setup = config.setups[last.disc]
     whole = replace(last, time=last.reference_time)
     times, states = Predictor(config).path(whole, rate)
     rows = np.empty((len(times), COLUMNS))
     rows[:, 0] = times - last.reference_time
     rows[:, 1:-3] = states
-    rows[:, -3:] = paper_from_map(np.array([*last.wind, flip(config.setup.wind.mean[2])]))
-    return Trajectory(rows, config.setup.disc.diameter)
+    rows[:, -3:] = paper_from_map(np.array([*last.wind, flip(setup.wind.mean[2])]))
+    return Trajectory(rows, setup.disc.diameter)
 
 
 def measurements(

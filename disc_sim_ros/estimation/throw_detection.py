@@ -69,21 +69,20 @@ def _is_flight(t: FloatArray, position: FloatArray, sigma: FloatArray) -> bool:
     return bool(np.linalg.norm(acceleration) < _MOST_ACCELERATION + 2.0 * noise)
 
 
-def has_ended(now: float, landing_time: float, measured: FloatArray, position: FloatArray) -> bool:
+def has_ended(now: float, landing_time: float, squares: FloatArray, position: FloatArray) -> bool:
     """Return True if a throw is over: it landed, or the newest measurements cannot be of it.
 
     Args:
         now: Time of the newest measurement since the reference [s].
         landing_time: Predicted [s]; nan without a landing.
-        measured: Residuals of all measurements, shape (k, 6).
+        squares: Squared residuals of all positions, shape (k,).
         position: The measurements, shape (k, 3).
     """
     if now > landing_time + AFTER_LANDING:
         return True
-    if len(measured) < ENDED_BY + LEAST:
+    if len(squares) < ENDED_BY + LEAST:
         return False
-    last = np.sum(measured[-ENDED_BY:, :3] ** 2, axis=1)
-    if not (last > _FAR).all():
+    if not (squares[-ENDED_BY:] > _FAR).all():
         return False
     steps = np.linalg.norm(np.diff(position[-ENDED_BY:], axis=0), axis=1)
     return float(np.median(steps)) < _ONE_STOP

@@ -9,7 +9,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import lift_coordinates, local
-from disc_sim_ros.estimation.ellipse import linear_covariance, profiled_covariance
+from disc_sim_ros.estimation.ellipse import drawn_landings
 from disc_sim_ros.estimation.throw_fit import (
     POSITION,
     Estimate,
@@ -21,6 +21,7 @@ from disc_sim_ros.estimation.throw_fit import (
     linearised,
     square_root,
 )
+from disc_sim_ros.physics.kernels.tracking import SEEN
 
 FIRST_STEPS = 6  # Gauss-Newton steps of the first update
 _FIRST_VELOCITY = 1.0  # m/s, with which the first derivatives are taken
@@ -42,7 +43,7 @@ class ThrowEstimator:
         self._model = model
         self.fitted: Fitted | None = None
         self.linear: Linear | None = None
-        self._scale = np.ones(6)
+        self._scale = np.ones(SEEN)
         self._spread = _first_spread(model)
         self._data: Measurements | None = None
 
@@ -53,38 +54,41 @@ class ThrowEstimator:
             data: All measurements so far, the first at time 0.
             steps: Gauss-Newton steps; the first update makes more.
         """
+        model = self._model
         if self.fitted is None or self._scale[0] > _LOST or not math.isfinite(self.fitted.cost):
-            estimate, self._spread = first_estimate(self._model, data), _first_spread(self._model)
+            estimate, self._spread = first_estimate(model, data), _first_spread(model)
             steps = FIRST_STEPS
         else:
             estimate = self.fitted.estimate
-        for _ in range(steps):
-            self.linear, step, self._scale = linearised(self._model, estimate, self._spread, data)
-            self.fitted = best_on_line(self._model, estimate, step, data, self._scale)
+        for k in range(steps):
+            duration = model.duration if k == steps - 1 else 0.0
+            self.linear, step, self._scale = linearised(model, estimate, self._spread, data)
+            self.fitted = best_on_line(model, estimate, step, data, self._scale, duration)
             estimate = self.fitted.estimate
             self._spread = square_root(self.linear.covariance[POSITION:, POSITION:])
         self._data = data
         assert self.fitted is not None  # noqa: S101 - for the type checker
         return self.fitted
 
-    def landing_covariance(self, *, profiled: bool = True) -> FloatArray:
-        """Return the covariance of X, Y [m] and time [s] of the landing, shape (3, 3).
+    def landings(self) -> FloatArray:
+        """Return likely landings, see `ellipse.drawn_landings`."""
+        if self.fitted is None or self.linear is None or self._data is None:
+            return np.empty((0, 3))
+        now = float(self._data.time[-1])
+        return drawn_landings(self._model, self.fitted.estimate, self.linear, now)
 
-        Args:
-            profiled: By a profile of the fit, which takes a few times an update; else linear.
+    @property
+    def log_evidence(self) -> float:
+        """Return the logarithm of the probability of the measurements, but for a constant.
+
+        By Laplace's method, comparable between discs.
         """
         if self.fitted is None or self.linear is None or self._data is None:
-            return np.full((3, 3), np.nan)
-        if not profiled:
-            return linear_covariance(self.linear)
-        return profiled_covariance(
-            self._model,
-            self.fitted.estimate,
-            self.fitted.landing,
-            self.linear,
-            self._data,
-            self._scale,
-        )
+            return -math.inf
+        _, volume = np.linalg.slogdet(self.linear.covariance)
+        measured = np.count_nonzero(self._data.per_sigma, axis=0)
+        scales = float(measured @ np.log(self._scale) + np.sum(np.log(self._model.sigmas)))
+        return 0.5 * float(volume) - self.fitted.cost - scales
 
 
 def _first_spread(model: Model) -> FloatArray:

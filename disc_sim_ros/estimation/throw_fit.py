@@ -8,24 +8,25 @@ covariance: where a table of coefficients has a corner, they are the mean slopes
 
 from dataclasses import dataclass
 from functools import cached_property
+import math
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import lift_coordinates, local
+from disc_sim_ros.estimation import lanes, lift_coordinates
 from disc_sim_ros.estimation.prior import ThrowPrior
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.equations import State
-from disc_sim_ros.physics.kernels.integrator import LANDED
 from disc_sim_ros.physics.kernels.rows import AT
-from disc_sim_ros.physics.sampled import Sampled, default_row, fly_sampled
+from disc_sim_ros.physics.kernels.tracking import SEEN
+from disc_sim_ros.physics.sampled import default_row
+from disc_sim_ros.physics.tracked import Tracker, Tracks
 
+_LANDING = 3  # X, Y and time of a landing
 POSITION = 3  # the first unknowns: position, in which flights are linear
 FRACTIONS = np.array([1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.0])  # of a step, tried at once
-_LANDING = 3  # X, Y and time of a landing
-_GATE = 14.0  # squared residual of a position from which it counts less; 1 in 350 is beyond
+GATE = 14.0  # squared residual of a position from which it counts less; 1 in 350 is beyond
 _USUAL = 2.37  # median of chi-squared with 3 degrees of freedom
-_NO_COST = np.inf
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,22 @@ class Measurements:
     @cached_property
     def has_axis(self) -> bool:
         """Return True if any measurement has an attitude."""
-        return bool(np.isfinite(self.axis).any())
+        return bool((self.per_sigma[:, 3] > 0.0).any())
+
+    @cached_property
+    def sights(self) -> FloatArray:
+        """Return positions and axes, 0 where they were not measured, shape (k, 6)."""
+        sights = np.concatenate([self.position, self.axis], axis=1)
+        sights[~np.isfinite(sights)] = 0.0
+        return sights
+
+    @cached_property
+    def per_sigma(self) -> FloatArray:
+        """Return one over the standard deviations, 0 where nothing was measured, shape (k, 6)."""
+        inverse = np.empty((len(self.time), SEEN))
+        inverse[:, :3] = (1.0 / self.sigma)[:, None]
+        inverse[:, 3:] = np.isfinite(self.axis) / self.axis_sigma[:, None]
+        return inverse
 
 
 @dataclass(frozen=True)
@@ -69,6 +85,11 @@ class Model:
     duration: float
 
     @cached_property
+    def tracker(self) -> Tracker:
+        """Return what flies the throws."""
+        return Tracker(self.setup, self.step)
+
+    @cached_property
     def row(self) -> FloatArray:
         """Return the constants of a flight at the means of the prior."""
         row = default_row(self.setup)
@@ -82,6 +103,11 @@ class Model:
         return [AT[name] for name in self.prior.constants]
 
     @cached_property
+    def offsets(self) -> list[int]:
+        """Return which of the uncertain constants are of the disc."""
+        return [k for k, name in enumerate(self.prior.constants) if name in self.prior.offsets]
+
+    @cached_property
     def means(self) -> FloatArray:
         """Return the means of the uncertain constants, shape (c,)."""
         return np.array([g.mean for g in self.prior.constants.values()])
@@ -91,7 +117,7 @@ class Model:
         """Return the standard deviations of the uncertain constants, shape (c,)."""
         return np.array([g.sigma for g in self.prior.constants.values()])
 
-    @property
+    @cached_property
     def unknowns(self) -> int:
         """Return the number of unknowns."""
         return len(self.coordinates) + len(self.columns)
@@ -100,30 +126,39 @@ class Model:
     def coordinates(self) -> list[int]:
         """Return the places of the unknowns in `lift_coordinates.NAMES`.
 
-        The precession model has no nutation: p and q follow from the other numbers.
+        Without nutation p and q follow from the other numbers.
         """
-        without = {'p', 'q'} if self.setup.model == 'precession' else set()
+        without = {'p', 'q'} if self.setup.has_no_nutation else set()
         return [i for i, name in enumerate(lift_coordinates.NAMES) if name not in without]
 
-    def moved(self, estimate: 'Estimate', deltas: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return n states and constants, moved by deltas of shape (n, unknowns)."""
+    @cached_property
+    def curve(self) -> lanes.Curve:
+        """Return the lift curve of the disc in its air."""
+        disc, plant = self.setup.disc, self.setup.plant
+        curve = lift_coordinates.lift_curve(disc, self.setup.aero or disc.aero)
+        return lanes.Curve(
+            np.ascontiguousarray(curve.alpha),
+            np.ascontiguousarray(curve.C_Lift),
+            0.5 * plant.rho * plant.S / plant.m,
+        )
+
+    def moved(self, estimate: 'Estimate', deltas: FloatArray) -> 'Throws':
+        """Return n throws, moved by deltas of shape (n, unknowns)."""
         k = len(self.coordinates)
         moves = np.zeros((len(deltas), lift_coordinates.SIZE))
         moves[:, self.coordinates] = deltas[:, :k]
         constants = estimate.constants + deltas[:, k:]
         row, rows = self.rows(estimate.constants[None])[0], self.rows(constants)
-        states = lift_coordinates.moved(self.setup, self.curve, estimate.state, row, moves, rows)
-        return states, constants
-
-    @cached_property
-    def curve(self) -> lift_coordinates.LiftCurve:
-        """Return the lift curve of the disc."""
-        disc = self.setup.disc
-        return lift_coordinates.lift_curve(disc, self.setup.aero or disc.aero)
+        states = np.empty((len(deltas), len(estimate.state)))
+        lanes.move(estimate.state, row, moves, rows, self.curve, states)
+        of_constants = (constants - self.means) / self.sigmas
+        prior = np.concatenate([self.prior.state_residuals(states), of_constants], axis=1)
+        return Throws(states, constants, rows, prior)
 
     def rows(self, constants: FloatArray) -> FloatArray:
         """Return the constants of n flights, shape (n, len(NAMES))."""
-        rows = np.tile(self.row, (len(constants), 1))
+        rows = np.empty((len(constants), len(self.row)))
+        rows[:] = self.row
         rows[:, self.columns] = constants
         return rows
 
@@ -142,21 +177,24 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
-class Residuals:
-    """Residuals and landings of n throws.
+class Throws:
+    """Throws side by side.
 
     Attributes:
-        measured: Position and axis less those measured, over their standard deviations; 0 where
-            nothing was measured; shape (n, k, 6).
-        prior: Shape (n, 7 + c).
-        landing: X, Y [m] and time since the reference [s]; nan without landing, shape (n, 3).
-        flights: The flights.
+        states: At the reference, shape (n, 14).
+        constants: The uncertain ones, shape (n, c).
+        rows: All constants of the flights, shape (n, len(NAMES)).
+        prior: By how many standard deviations they differ from the prior, shape (n, 7 + c).
     """
 
-    measured: FloatArray
+    states: FloatArray
+    constants: FloatArray
+    rows: FloatArray
     prior: FloatArray
-    landing: FloatArray
-    flights: Sampled
+
+    def __getitem__(self, i: int) -> Estimate:
+        """Return one of them."""
+        return Estimate(self.states[i], self.constants[i])
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,18 +203,16 @@ class Fitted:
 
     Attributes:
         estimate: The throw.
-        measured: Its residuals, shape (k, 6).
+        squares: Squared residuals of positions and of axes, unscaled, shape (k, 2).
         landing: X, Y and time; nan without a landing, shape (3,).
-        states: States at the measurements, shape (k, 14).
-        end: State at the landing, shape (14,).
+        last: State at the newest measurement, shape (14,).
         cost: Half its sum of squares.
     """
 
     estimate: Estimate
-    measured: FloatArray
+    squares: FloatArray
     landing: FloatArray
-    states: FloatArray
-    end: FloatArray
+    last: FloatArray
     cost: float
 
 
@@ -186,7 +222,8 @@ class Linear:
 
     Attributes:
         covariance: Of the unknowns, shape (m, m).
-        landing: Derivatives of X, Y and time of the landing, shape (3, m).
+        landing: Derivatives of X, Y and time of the landing, shape (3, m); nan if they were not
+            asked for.
         now: Derivatives of position and velocity at the newest measurement, shape (6, m).
     """
 
@@ -195,74 +232,47 @@ class Linear:
     now: FloatArray
 
 
-def residuals(
-    model: Model, states: FloatArray, constants: FloatArray, data: Measurements
-) -> Residuals:
-    """Fly n throws and compare them with the measurements and the prior."""
-    n = len(states)
-    flights = fly_sampled(
-        states,
-        model.rows(constants),
-        model.setup,
-        data.time,
-        step=model.step,
-        duration=model.duration,
-    )
-    measured = np.zeros((n, len(data.time), 6))
-    measured[:, :, :3] = (flights.states[:, :, :3] - data.position) / data.sigma[:, None]
-    if data.has_axis:
-        axes = (local.disc_axis(flights.states) - data.axis) / data.axis_sigma[:, None]
-        measured[:, :, 3:] = np.where(np.isfinite(data.axis), axes, 0.0)
-    landing = np.column_stack([flights.ends[:, :2], flights.time])
-    landing[flights.status != LANDED] = np.nan
-    of_constants = (constants - model.means) / model.sigmas
-    prior = np.hstack([model.prior.state_residuals(states), of_constants])
-    return Residuals(measured, prior, landing, flights)
-
-
-def costs(r: Residuals, scale: FloatArray) -> FloatArray:
+def costs(tracks: Tracks, throws: Throws, data: Measurements, scale: FloatArray) -> FloatArray:
     """Return half the sum of squared residuals of n throws, shape (n,); outliers count less."""
-    position, axis = _squares(r.measured / scale)
-    beyond = np.maximum(position, _GATE)
-    robust = np.where(position > _GATE, 2.0 * _GATE - _GATE**2 / beyond, position)
-    beyond = np.maximum(axis, _GATE)
-    robust = robust + np.where(axis > _GATE, 2.0 * _GATE - _GATE**2 / beyond, axis)
-    total: FloatArray = 0.5 * (np.sum(robust, axis=1) + np.sum(r.prior**2, axis=1))
-    return np.where(np.isfinite(total), total, _NO_COST)
+    total = np.empty(len(throws.states))
+    per_sigma = data.per_sigma / scale
+    lanes.costs(tracks.sights, data.sights, per_sigma, throws.prior, GATE, total)
+    return total
 
 
-def scale_of(measured: FloatArray) -> FloatArray:
+def scale_of(squares: FloatArray) -> FloatArray:
     """Return how much larger residuals are than stated, from their median; at least 1.
 
     Args:
-        measured: Residuals of one throw, shape (k, 6).
+        squares: Squared residuals of positions and axes of one throw, 0 where none was measured,
+            shape (k, 2).
 
     Returns:
-        A factor for each column, shape (6,).
+        A factor for each column of `Measurements.sights`, shape (6,).
     """
-    position, axis = _squares(measured)
-    factors = [np.sqrt(max(1.0, float(np.median(position)) / _USUAL)), 1.0]
-    if np.any(axis > 0.0):
-        factors[1] = np.sqrt(max(1.0, float(np.median(axis[axis > 0.0])) / _USUAL))
-    return np.repeat(factors, 3)
+    factors = np.ones(SEEN)
+    for part in range(2):
+        known = squares[:, part]
+        known = known[known > 0.0]
+        if len(known):
+            middle = float(np.partition(known, len(known) // 2)[len(known) // 2])
+            factors[3 * part : 3 * part + 3] = math.sqrt(max(1.0, middle / _USUAL))
+    return factors
 
 
-def _squares(measured: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.sum(measured[..., :3] ** 2, axis=-1), np.sum(measured[..., 3:] ** 2, axis=-1)
-
-
-def root_weights(measured: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the square roots of the weights of scaled residuals, shape (k, 6).
-
-    A weight is 1 up to the gate, and falls with the fourth power of the residual beyond.
-    """
-    position, axis = _squares(measured / scale)
-    roots = [np.minimum(1.0, _GATE / np.maximum(x, _GATE)) for x in (position, axis)]
-    return np.repeat(np.stack(roots, axis=1), 3, axis=1) / scale
+def squares_of(residuals: FloatArray) -> FloatArray:
+    """Return squared residuals of positions and axes, shape (k, 2), from shape (k, 6)."""
+    squared: FloatArray = (residuals**2).reshape(-1, 2, 3).sum(axis=2)
+    return squared
 
 
 def linearised(
-    model: Model, estimate: Estimate, spread: FloatArray, data: Measurements
+    model: Model,
+    estimate: Estimate,
+    spread: FloatArray,
+    data: Measurements,
+    *,
+    to_landing: bool = False,
 ) -> tuple[Linear, FloatArray, FloatArray]:
     """Fly around an estimate.
 
@@ -272,6 +282,7 @@ def linearised(
         spread: Columns of standard deviations of all unknowns but the position, shape (m - 3,
             m - 3).
         data: The measurements.
+        to_landing: Also compute the derivatives of the landing.
 
     Returns:
         The linear fit, the Gauss-Newton step, shape (m,), and the scale of the residuals.
@@ -281,40 +292,40 @@ def linearised(
     deltas = np.zeros((1 + 2 * free, m))
     deltas[1 : 1 + free, POSITION:] = spread.T
     deltas[1 + free :, POSITION:] = -spread.T
-    r = residuals(model, *model.moved(estimate, deltas), data)
-    scale = scale_of(r.measured[0])
-    roots = root_weights(r.measured[0], scale)
+    throws = model.moved(estimate, deltas)
+    duration = model.duration if to_landing else 0.0
+    tracks = model.tracker.fly(throws.states, throws.rows, data.time, duration)
+    off = tracks.sights[0, :, :, 0] - data.sights
+    scaled = data.per_sigma * off
+    scale = scale_of(squares_of(scaled))
+    squares = squares_of(scaled / scale)
+    weights = np.repeat(GATE / np.maximum(squares, GATE), 3, axis=1)
+    roots = data.per_sigma / scale * weights
 
     # Unknowns here: position [m], then multiples of the columns of `spread`.
-    measured = np.zeros((len(data.time), 6, m))
-    for axis in range(POSITION):
-        measured[:, axis, axis] = 1.0 / data.sigma
-    measured[:, :, POSITION:] = _half_difference(r.measured, free)
-    slopes = (measured * roots[:, :, None]).reshape(-1, m)
-    prior = np.zeros((r.prior.shape[1], m))
-    prior[:, POSITION:] = _half_difference(r.prior, free)
-    landing = np.zeros((_LANDING, m))
-    landing[:, POSITION:] = _half_difference(r.landing, free)
-    landing[:, :POSITION] = _landing_by_position(r.flights.ends[0])
-
+    equations = lanes.equations(m)
+    lanes.normal_equations(tracks.sights, off, roots, throws.prior, free, np.empty(m), equations)
+    landing = np.full((_LANDING, m), np.nan)
+    if to_landing:
+        landing[:, POSITION:] = _half_difference(tracks.landing, free)
+        landing[:, :POSITION] = _landing_by_position(tracks.ends[0])
     now = np.eye(6, m)
     now[POSITION:, POSITION:] = 0.0
-    now[:, POSITION:] = _half_difference(r.flights.states[:, -1, :6], free)
+    now[:, POSITION:] = _half_difference(tracks.last[:, :6], free)
 
-    normal = slopes.T @ slopes + prior.T @ prior
-    gradient = slopes.T @ (r.measured[0] * roots).ravel() + prior.T @ r.prior[0]
-    inverted = inverse(normal)
+    inverted = inverse(equations.normal)
     turn = np.eye(m)
     turn[POSITION:, POSITION:] = spread
     back = np.linalg.inv(turn)
     linear = Linear(turn @ inverted @ turn.T, landing @ back, now @ back)
-    return linear, -turn @ (inverted @ gradient), scale
+    return linear, -turn @ (inverted @ equations.gradient), scale
 
 
 def _half_difference(values: FloatArray, free: int) -> FloatArray:
     """Return the derivatives, last axis, from lanes: base, plus, minus; 0 where one is lost."""
-    difference = 0.5 * (values[1 : 1 + free] - values[1 + free :])
-    return np.moveaxis(np.nan_to_num(difference, nan=0.0, posinf=0.0, neginf=0.0), 0, -1)
+    difference: FloatArray = 0.5 * (values[1 : 1 + free] - values[1 + free :])
+    difference[~np.isfinite(difference)] = 0.0
+    return difference.T
 
 
 def _landing_by_position(end: FloatArray) -> FloatArray:
@@ -339,18 +350,22 @@ def square_root(covariance: FloatArray) -> FloatArray:
 
 
 def best_on_line(
-    model: Model, estimate: Estimate, step: FloatArray, data: Measurements, scale: FloatArray
+    model: Model,
+    estimate: Estimate,
+    step: FloatArray,
+    data: Measurements,
+    scale: FloatArray,
+    duration: float,
 ) -> Fitted:
-    """Return the best of several fractions of a step."""
-    states, constants = model.moved(estimate, FRACTIONS[:, None] * step)
-    r = residuals(model, states, constants, data)
-    cost = costs(r, scale)
+    """Return the best of several fractions of a step, with its landing within a duration [s]."""
+    throws = model.moved(estimate, FRACTIONS[:, None] * step)
+    tracks = model.tracker.fly(throws.states, throws.rows, data.time, duration)
+    cost = costs(tracks, throws, data, scale)
     i = int(np.argmin(cost))
     return Fitted(
-        Estimate(states[i], constants[i]),
-        r.measured[i],
-        r.landing[i],
-        r.flights.states[i],
-        r.flights.ends[i],
+        throws[i],
+        squares_of((tracks.sights[0, :, :, i] - data.sights) * data.per_sigma),
+        tracks.landing[i],
+        tracks.last[i],
         float(cost[i]),
     )

@@ -20,6 +20,7 @@ from disc_sim_ros.physics.kernels.equations import (
     CONSTANT_SPIN,
     EXACT,
     PRECESSION,
+    SLOWING_PRECESSION,
     WIND,
     Control,
     Plant,
@@ -34,6 +35,10 @@ from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT, DURATION, SAMPLE_RATE, STEP
 
 MODELS = {'exact': EXACT, 'constant_spin': CONSTANT_SPIN, 'precession': PRECESSION}
+# Precession with the spin slowing down as in the exact model: what estimators fly. Not of the
+# paper, so no program offers it.
+SLOWING = 'slowing_precession'
+_MODEL_NUMBERS = {**MODELS, SLOWING: SLOWING_PRECESSION}
 MOMENT_AXES = {'body': BODY, 'wind': WIND}
 NO_CONTROL = Control()
 MOST_SAMPLES = 5_000_000
@@ -68,7 +73,8 @@ class Setup:
     ground_contact: str | None = None
 
     def __post_init__(self) -> None:
-        validation.choice('model', self.model, MODELS)
+        if self.model != SLOWING:
+            validation.choice('model', self.model, MODELS)
         validation.choice('moment_axes', self.moment_axes, MOMENT_AXES)
         STEP.check(self.step)
         if self.ground_contact is not None:
@@ -78,6 +84,11 @@ class Setup:
             if not self.disc.has(self.aero):
                 allowed = f'disc {self.disc.name} has no such coefficients'
                 raise ConfigError('aero', self.aero, allowed)
+
+    @property
+    def has_no_nutation(self) -> bool:
+        """Return True if p and q follow the moments without delay."""
+        return self.model in {'precession', SLOWING}
 
     @property
     def lands_on(self) -> str:
@@ -99,7 +110,7 @@ class Setup:
             C_Nr=float(disc.C_Nr),
             rho=float(self.air.density),
             g=float(self.air.gravity),
-            model=MODELS[self.model],
+            model=_MODEL_NUMBERS[self.model],
             moment_axes=MOMENT_AXES[self.moment_axes],
             use_linear=(self.aero or disc.aero) == 'linear',
             line=_line(disc),
@@ -118,7 +129,7 @@ class Setup:
         Raises:
             ConfigError: RK4 would be unstable.
         """
-        if self.model == 'precession':  # p and q follow the moments without delay
+        if self.has_no_nutation:  # p and q follow the moments without delay
             return
         V = speed + math.hypot(*self.wind.mean)
         steepest = self.disc.steepest_moment(self.aero or self.disc.aero)

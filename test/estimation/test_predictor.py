@@ -22,11 +22,11 @@ def follow(
 ) -> Prediction:
     """Return the prediction after the measurements up to `until`, an update for every fourth."""
     predictor, prediction = Predictor(config), None
-    for k, m in enumerate(m for m in measurements if m.time <= until):
+    sights = [m for m in measurements if m.time <= until]
+    for k, m in enumerate(sights):
         predictor.add(m)
-        if k < 12 or k % 4 == 0:  # a computer that is late
-            prediction = predictor.update(profiled=False) or prediction
-    prediction = predictor.update(profiled=False) or prediction
+        if k < 12 or k % 4 == 0 or m is sights[-1]:  # a computer that is late
+            prediction = predictor.update(ellipse=m is sights[-1]) or prediction
     assert prediction is not None
     return prediction
 
@@ -40,13 +40,18 @@ def throws() -> list[Throw]:
     return [throw(SETUP, PRIOR, seed) for seed in range(10)]
 
 
-def test_landing_is_known_after_a_second(throws):
-    """The bound of these throws is 0.2 m with attitude (benchmarks/predictor.py).
+@pytest.fixture(scope='module')
+def many_throws(throws) -> list[Throw]:
+    return [*throws, *(throw(SETUP, PRIOR, seed) for seed in range(10, 24))]
 
-    The median of ten throws lies within a factor of 2 of that of many.
+
+def test_landing_is_known_after_a_second(many_throws):
+    """The bound of these throws is 0.25 m with attitude (benchmarks/predictor.py).
+
+    The median of 24 throws lies within a factor of 1.5 of that of many.
     """
-    misses = [miss(follow(t.measurements(axis=True), 1.0), t) for t in throws]
-    assert np.median(misses) < 0.5
+    misses = [miss(follow(t.measurements(axis=True), 1.0), t) for t in many_throws]
+    assert np.median(misses) < 0.45
 
 
 def test_positions_alone_need_longer(throws):
@@ -66,21 +71,26 @@ def test_last_prediction_is_within_centimetres(throws):
         assert prediction.landing_time == pytest.approx(t.landing[2], abs=0.02)
 
 
-def test_ellipse_is_of_the_size_of_the_miss(throws):
-    """Nine of ten landings lie in a right ellipse; of ten, fewer than six are 1 in 600."""
+@pytest.mark.parametrize('axis', [True, False], ids=['attitude', 'position'])
+def test_ellipse_is_of_the_size_of_the_miss(many_throws, axis):
+    """Nine of ten landings lie in a right ellipse; of 24, fewer than 15 are 1 in 10^6.
+
+    Half of them would lie in an ellipse half as long and wide (with 44 %, 15 are 1 in 20).
+    """
     inside = 0
-    for t in throws:
+    for t in many_throws:
         predictor = Predictor(CONFIG)
         prediction = None
-        for m in t.measurements(axis=True):
+        for k, m in enumerate(t.measurements(axis=axis)):
             if m.time > 1.0:
                 break
             predictor.add(m)
-            prediction = predictor.update(profiled=m.time > 0.98) or prediction
+            if k < 12 or k % 4 == 0:
+                prediction = predictor.update(ellipse=m.time > 0.98) or prediction
         off = prediction.landing - t.landing[:2]
         inside += off @ np.linalg.solve(prediction.covariance[:2, :2], off) < INSIDE
-        assert np.sqrt(np.trace(prediction.covariance[:2, :2])) < 5.0
-    assert inside >= 6
+        assert np.sqrt(np.trace(prediction.covariance[:2, :2])) < 20.0
+    assert inside >= 15
 
 
 def test_same_measurements_give_the_same_bits(throws):
@@ -113,18 +123,18 @@ def test_throw_begins_after_the_hand_and_ends_on_the_ground(throws):
         before = max(tau, -speed / 100.0)
         at = t.position[0] + velocity * before + 0.5 * 100.0 * velocity / speed * before**2
         predictor.add(Measurement(tau, tuple(at)))
-        assert predictor.update(profiled=False) is None
+        assert predictor.update(ellipse=False) is None
     first = None
     for m in t.measurements():
         predictor.add(m)
-        if predictor.update(profiled=False) is not None and first is None:
+        if predictor.update(ellipse=False) is not None and first is None:
             first = m.time
     assert first is not None
     assert first < 0.15  # a window of 0.1 s and two more measurements
     x, y, end = t.landing
     for k in range(1, 30):
         predictor.add(Measurement(end + k / 60.0, (x, y, 0.0)))
-        predictor.update(profiled=False)
+        predictor.update(ellipse=False)
         if not predictor.is_following:
             break
     assert k / 60.0 < 0.2
@@ -140,7 +150,7 @@ def test_throw_is_recognised_from_six_measurements_of_a_slow_tracker(rate):
     predictions = []
     for m in [*still, *flown.measurements(axis=True)]:
         predictor.add(m)
-        predictions.append(predictor.update(profiled=False))
+        predictions.append(predictor.update(ellipse=False))
     first = next(p for p in predictions if p is not None)
     assert predictor.throws == 1
     assert first.reference_time == pytest.approx(0.0, abs=1.0 / rate + 1e-9)
@@ -155,11 +165,11 @@ def test_catch_ends_a_throw(throws):
         if m.time > 1.0:
             break
         predictor.add(m)
-        predictor.update(profiled=False)
+        predictor.update(ellipse=False)
     assert predictor.is_following
     for k in range(1, 20):
         predictor.add(Measurement(1.0 + k / 60.0, tuple(t.position[60])))
-        predictor.update(profiled=False)
+        predictor.update(ellipse=False)
         if not predictor.is_following:
             break
     assert not predictor.is_following
@@ -173,10 +183,10 @@ def test_order_of_measurements_does_not_matter(throws):
         predictor = Predictor(CONFIG)
         for m in order[:10]:
             predictor.add(m)
-        predictor.update(profiled=False)
+        predictor.update(ellipse=False)
         for m in order[10:]:
             predictor.add(m)
-        predictions.append(predictor.update(profiled=False))
+        predictions.append(predictor.update(ellipse=False))
     assert predictions[0].landing.tobytes() == predictions[1].landing.tobytes()
 
 
@@ -185,7 +195,7 @@ def test_measurement_before_the_throw_and_repeated_ones_are_counted(throws):
     measurements = throws[0].measurements()
     for m in measurements[5:20]:
         predictor.add(m)
-    predictor.update(profiled=False)
+    predictor.update(ellipse=False)
     assert predictor.is_following
     assert not predictor.add(measurements[0])
     assert not predictor.add(measurements[10])
@@ -219,7 +229,7 @@ def test_memory_of_a_throw_is_bounded(throws):
         predictor.add(m)
         assert len(predictor._rows) <= MOST_MEASUREMENTS
         if k % 100 == 99:
-            prediction = predictor.update(profiled=False) or prediction
+            prediction = predictor.update(ellipse=False) or prediction
     assert miss(prediction, t) < 0.5
 
 
@@ -236,3 +246,29 @@ def test_bad_measurement_is_refused(field, value):
     good = {'time': 0.0, 'position': (0.0, 0.0, 1.0)}
     with pytest.raises(ConfigError, match=f'measured {field}'):
         Measurement(**{**good, field: value})
+
+
+def test_disc_that_flew_gets_the_weight():
+    """A Frisbee and a golf disc: the one glides, the other is fast."""
+    names = ('ultrastar', 'wraith')
+    setups = [Setup(disc=load_disc(name)) for name in names]
+    for flown in (0, 1):
+        prior = ThrowPrior(offsets=disc_offsets(setups[flown].disc))
+        of_other = ThrowPrior(offsets=disc_offsets(setups[1 - flown].disc))
+        config = PredictorConfig(
+            setup=setups[flown], prior=prior, others=((setups[1 - flown], of_other),)
+        )
+        right = 0
+        for seed in range(3):
+            prediction = follow(throw(setups[flown], prior, seed).measurements(), 1.5, config)
+            assert prediction.weights.sum() == pytest.approx(1.0)
+            right += prediction.weights[0] > 0.9
+        assert right >= 2
+
+
+def test_equal_discs_share_the_weight_and_change_nothing(throws):
+    config = replace(CONFIG, others=((SETUP, PRIOR),))
+    one, two = (follow(throws[0].measurements(), 1.0, c) for c in (CONFIG, config))
+    assert two.weights == pytest.approx([0.5, 0.5])
+    assert two.landing.tobytes() == one.landing.tobytes()
+    assert two.covariance == pytest.approx(one.covariance, rel=1e-12)

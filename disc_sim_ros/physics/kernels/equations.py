@@ -24,7 +24,7 @@ from disc_sim_ros.physics.kernels.jit import inline
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 from disc_sim_ros.physics.kernels.simd import where
 
-EXACT, CONSTANT_SPIN, PRECESSION = range(3)  # rigid-body models
+EXACT, CONSTANT_SPIN, PRECESSION, SLOWING_PRECESSION = range(4)  # rigid-body models
 BODY, WIND = range(2)  # axes in which the moment coefficients act: 3 or 4
 DISC, DISC_BODY, DISC_AIR = range(3)  # axes of a moment given in N m
 
@@ -67,7 +67,7 @@ class Plant(NamedTuple):
     C_Nr: float
     rho: float  # kg/m^3
     g: float  # m/s^2
-    model: int  # EXACT, CONSTANT_SPIN or PRECESSION
+    model: int  # EXACT, CONSTANT_SPIN, PRECESSION or SLOWING_PRECESSION
     moment_axes: int  # BODY or WIND
     use_linear: bool  # straight lines instead of the table
     line: Linear
@@ -274,8 +274,10 @@ def derivative(s: State, wind: Velocity, plant: Plant, control: Control) -> Stat
     m = moment(a, s, C, plant, control)
     p, q, r = s.p, s.q, s.r
     p_dot = q_dot = r_dot = 0.0
-    if plant.model == PRECESSION:
+    if plant.model >= PRECESSION:
         p, q = precession_rates(r, m, plant.I_z)
+        if plant.model == SLOWING_PRECESSION:
+            r_dot = m.N / plant.I_z
     else:
         # Eqn 11 with the axes turning at (p, q, 0) and the angular momentum (I_x p, I_x q, I_z r).
         H = r * plant.I_z
@@ -312,11 +314,11 @@ def derivative(s: State, wind: Velocity, plant: Plant, control: Control) -> Stat
 
 @inline
 def consistent(s: State, wind: Velocity, plant: Plant, control: Control) -> State:
-    """Return the state with a unit quaternion and, in the precession model, with its p and q."""
+    """Return the state with a unit quaternion and, in the precession models, their p and q."""
     n = 1.0 / math.sqrt(s.e0 * s.e0 + s.e1 * s.e1 + s.e2 * s.e2 + s.e3 * s.e3)
     e0, e1, e2, e3 = s.e0 * n, s.e1 * n, s.e2 * n, s.e3 * n
     p, q = s.p, s.q
-    if plant.model == PRECESSION:
+    if plant.model >= PRECESSION:
         a = flow(s, wind)
         C = coefficients(a, s.r, plant)
         p, q = precession_rates(s.r, moment(a, s, C, plant, control), plant.I_z)

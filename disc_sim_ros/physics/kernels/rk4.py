@@ -87,7 +87,7 @@ def is_sound(s: State, h: float, plant: Plant) -> bool:
     """Return True if the state is finite, and turns slowly enough for steps of `h` [s]."""
     total = s.X + s.Y + s.Z + s.VX + s.VY + s.VZ + s.e0 + s.e1 + s.e2 + s.e3
     fastest = max(abs(s.p), abs(s.q), abs(s.r))
-    if plant.model != PRECESSION:
+    if plant.model < PRECESSION:
         fastest = max(fastest, abs(s.r) * plant.I_z / plant.I_x)
     return (abs(total + s.sigma) < math.inf) & (fastest * h <= STABLE)
 

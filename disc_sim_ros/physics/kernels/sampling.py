@@ -28,7 +28,7 @@ from disc_sim_ros.physics.kernels.rows import NAMES, fill_table, inputs_of, plan
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
 from disc_sim_ros.physics.kernels.wind import wind_at
 
-_NO_GUST = Velocity(0.0, 0.0, 0.0)
+NO_GUST = Velocity(0.0, 0.0, 0.0)
 
 
 class Grid(NamedTuple):
@@ -107,14 +107,17 @@ def sample_rows(
         j = k = 0
         while j < len(times) or (out.status[i] == FLYING and k * step < grid.duration):
             t = k * step
-            next_s = rk4_step(s, step, _NO_GUST, _NO_GUST, own_plant, own_inputs)
+            next_s = rk4_step(s, step, NO_GUST, NO_GUST, own_plant, own_inputs)
             sound = is_sound(next_s, step, own_plant)
             if not sound:
                 next_s = s
             if j < len(times) and times[j] < t + step:
-                d, next_d = _rate(s, own_plant, own_inputs), _rate(next_s, own_plant, own_inputs)
+                d, next_d = (
+                    rate_of_change(s, own_plant, own_inputs),
+                    rate_of_change(next_s, own_plant, own_inputs),
+                )
                 while j < len(times) and times[j] < t + step:
-                    x = _between(s, d, next_s, next_d, step, times[j] - t, own_plant, own_inputs)
+                    x = between(s, d, next_s, next_d, step, times[j] - t, own_plant, own_inputs)
                     for c in range(STATE_SIZE):
                         out.states[i, j, c] = x[c] if sound else math.nan
                     j += 1
@@ -123,7 +126,7 @@ def sample_rows(
             s = next_s
             k += 1
         if out.status[i] == FLYING:
-            _write_state(i, k * step, s, out)
+            write_state(i, k * step, s, out)
 
 
 @entry
@@ -141,14 +144,14 @@ def sample_simd(
     for first in range(0, len(states), WIDTH):
         count = min(WIDTH, len(states) - first)
         for lane in range(WIDTH):
-            _fill_lane(a, lane, first + min(lane, count - 1), states, rows, plant, inputs, out)
+            fill_lane(a, lane, first + min(lane, count - 1), states, rows, plant, inputs, out)
         plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
         s = load_state(a.state)
         j = k = 0
         flying = WIDTH
         while j < len(times) or (flying > 0 and k * step < grid.duration):
             t = k * step
-            next_s = rk4_step(s, step, _NO_GUST, _NO_GUST, plants, all_inputs)
+            next_s = rk4_step(s, step, NO_GUST, NO_GUST, plants, all_inputs)
             sound = is_sound(next_s, step, plants)
             next_s = select(sound, next_s, s)
             if j < len(times) and times[j] < t + step:
@@ -173,18 +176,18 @@ def sample_simd(
                 for c in range(STATE_SIZE):
                     store(a.state, c, s[c])
                     store(a.next_state, c, next_s[c])
-                flying -= _end_lanes(a, first, count, t, step, rows, plant, inputs, out)
+                flying -= end_lanes(a, first, count, t, step, rows, plant, inputs, out)
             s = next_s
             k += 1
         for c in range(STATE_SIZE):
             store(a.state, c, s[c])
         for lane in range(count):
             if out.status[first + lane] == FLYING:
-                _write_state(first + lane, k * step, _lane_state(a.state, lane), out)
+                write_state(first + lane, k * step, lane_state(a.state, lane), out)
 
 
 @jit
-def _fill_lane(
+def fill_lane(
     a: SampleSpace,
     lane: int,
     i: int,
@@ -210,7 +213,7 @@ def _fill_lane(
 
 
 @jit
-def _end_lanes(
+def end_lanes(
     a: SampleSpace,
     first: int,
     count: int,
@@ -232,7 +235,7 @@ def _end_lanes(
                 fill_table(rows[i], plant.table, a.own_table)
                 own_plant = plant_of(rows[i], plant, a.own_table)
                 own_inputs = inputs_of(rows[i], inputs)
-                s, next_s = _lane_state(a.state, lane), _lane_state(a.next_state, lane)
+                s, next_s = lane_state(a.state, lane), lane_state(a.next_state, lane)
                 sound = a.flags[1, lane] < 2.0
                 _write_end(i, s, next_s, t, step, sound, own_plant, own_inputs, out)
     return ended
@@ -255,9 +258,9 @@ def _write_samples(
 ) -> int:
     """Write the samples in a step that starts at `t`, from the j-th on; return the next one."""
     step, times = grid.step, grid.times
-    d, next_d = _rate(s, plants, inputs), _rate(next_s, plants, inputs)
+    d, next_d = rate_of_change(s, plants, inputs), rate_of_change(next_s, plants, inputs)
     while j < len(times) and times[j] < t + step:
-        x = _between(s, d, next_s, next_d, step, times[j] - t, plants, inputs)
+        x = between(s, d, next_s, next_d, step, times[j] - t, plants, inputs)
         for c in range(STATE_SIZE):
             store(buffer, c, where(sound, x[c], math.nan))
         for lane in range(count):
@@ -268,12 +271,13 @@ def _write_samples(
 
 
 @jit
-def _rate(s: State, plant: Plant, inputs: Inputs) -> State:
-    return derivative(s, wind_at(s.Z, _NO_GUST, inputs.wind), plant, inputs.control)
+def rate_of_change(s: State, plant: Plant, inputs: Inputs) -> State:
+    """Return the rate of change of a state without gusts."""
+    return derivative(s, wind_at(s.Z, NO_GUST, inputs.wind), plant, inputs.control)
 
 
 @jit
-def _between(
+def between(
     s: State, d: State, end: State, end_d: State, h: float, t: float, plant: Plant, inputs: Inputs
 ) -> State:
     """Return the state at time `t` in a step of `h`, on the cubic of its ends and their rates."""
@@ -283,7 +287,7 @@ def _between(
     c2 = axpy(axpy(axpy(zero, 3.0, rise), -2.0 * h, d), -h, end_d)
     c3 = axpy(axpy(axpy(zero, -2.0, rise), h, d), h, end_d)
     x = axpy(axpy(axpy(s, t, d), f * f, c2), f * f * f, c3)
-    return consistent(x, wind_at(x.Z, _NO_GUST, inputs.wind), plant, inputs.control)
+    return consistent(x, wind_at(x.Z, NO_GUST, inputs.wind), plant, inputs.control)
 
 
 @jit
@@ -301,15 +305,16 @@ def _write_end(
     """Write the end of flight `i`: a landing in a step, or its loss."""
     if not sound:
         out.status[i] = LOST
-        _write_state(i, t, s, out)
+        write_state(i, t, s, out)
         return
     out.status[i] = LANDED
-    h, _, end = touchdown(s, step, next_s, _NO_GUST, _NO_GUST, plant, inputs)
-    _write_state(i, t + h, end, out)
+    h, _, end = touchdown(s, step, next_s, NO_GUST, NO_GUST, plant, inputs)
+    write_state(i, t + h, end, out)
 
 
 @inline
-def _write_state(i: int, t: float, s: State, out: Samples) -> None:
+def write_state(i: int, t: float, s: State, out: Samples) -> None:
+    """Write the end of flight `i`."""
     out.time[i] = t
     for c in range(STATE_SIZE):
         out.ends[i, c] = s[c]
@@ -323,5 +328,6 @@ def _state(e: FloatArray) -> State:
 
 
 @inline
-def _lane_state(a: FloatArray, lane: int) -> State:
+def lane_state(a: FloatArray, lane: int) -> State:
+    """Return the state in a column."""
     return _state(a[:, lane])

@@ -21,9 +21,7 @@ from visualization_msgs.msg import MarkerArray
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import Prediction, Predictor
-from disc_sim_ros.physics import sampled
-from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.estimation.predictor import Prediction, Predictor, first_call_note
 from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.internals import PolledSubscription
 from disc_sim_ros.ros.predictor import outputs
@@ -70,14 +68,15 @@ class PredictorNode(Node):
         self._predictor = Predictor(self._config.predictor)
         self._noise = np.random.default_rng(_NOISE_SEED)
         self._epoch: int | None = None
-        self._last_profile = -np.inf
+        self._last_ellipse = -np.inf
         self._throw = 0
         self._covariance = np.full((3, 3), np.nan)
+        self._likely: dict[str, float] = {}  # weight of each disc, by its name
         self.predictions = self.refused = 0
         # Before topics exist: who sees them may throw.
-        if note := sampled.first_call_note():
+        if note := first_call_note():
             self.get_logger().info(note)
-        self._warm_up()
+        self._predictor.warm_up()
 
         def publisher(kind: type, name: str) -> Any:
             return self.create_publisher(kind, name, STATE_QOS)
@@ -88,6 +87,7 @@ class PredictorNode(Node):
         self._ellipse = publisher(MarkerArray, PredictorTopic.ELLIPSE)
         self._intercept = publisher(PoseStamped, PredictorTopic.INTERCEPT)
         self._wind = publisher(Vector3Stamped, PredictorTopic.WIND)
+        self._weights = publisher(DiagnosticStatus, PredictorTopic.DISC_WEIGHTS)
         self._diagnostics = publisher(DiagnosticArray, topics.DIAGNOSTICS)
         self._subscriptions_by_source = {
             source: PolledSubscription(self, *_TYPES[source], MEASUREMENT_QOS)
@@ -97,17 +97,8 @@ class PredictorNode(Node):
         self._thread = PollingThread(self._take, POLLING_PERIOD)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
-        self.get_logger().info(
-            f'ready: {", ".join(self._config.sources)}, {self._config.predictor.setup.disc.name}'
-        )
-
-    def _warm_up(self) -> None:
-        """Load or compile the flights, so that no measurement waits for it."""
-        model = self._config.predictor.model
-        state = np.array([Launch(speed=15.0, height=1.0).state()])
-        rows = model.rows(model.means[None])
-        times = np.array([0.0, 0.1])
-        sampled.fly_sampled(state, rows, model.setup, times, step=model.step, duration=1.0)
+        discs = ' or '.join(self._config.predictor.discs)
+        self.get_logger().info(f'ready: {", ".join(self._config.sources)}, {discs}')
 
     def start(self) -> None:
         """Start the thread that predicts."""
@@ -158,36 +149,41 @@ class PredictorNode(Node):
 
     def _predict(self) -> None:
         newest = self._predictor.newest
-        profiled = not (
-            self._last_profile <= newest < self._last_profile + self._config.ellipse_period
-        )
-        prediction = self._predictor.update(profiled=profiled)
+        last, period = self._last_ellipse, self._config.ellipse_period
+        prediction = self._predictor.update(ellipse=not last <= newest < last + period)
         if prediction is None:
             return
-        if profiled:
-            self._last_profile = prediction.time
-        self._publish(prediction, profiled=profiled)
+        self._publish(prediction)
         self.predictions += 1
         if prediction.throw != self._throw:
             self._throw = prediction.throw
             self.get_logger().info(f'throw {self._throw}: following')
 
-    def _publish(self, p: Prediction, *, profiled: bool) -> None:
+    def _publish(self, p: Prediction) -> None:
         now, ground, frames = self._stamp(p.time), self._ground, self._frames
-        if profiled:
-            self._covariance = p.covariance
+        has_ellipse = bool(np.isfinite(p.covariance).all())
+        if has_ellipse:
+            self._last_ellipse, self._covariance = p.time, p.covariance
             self._ellipse.publish(outputs.ellipses(p, now, ground, frames))
         else:
             p = replace(p, covariance=self._covariance)
         self._landing.publish(outputs.landing(p, self._stamp(p.landing_time), ground, frames))
         self._estimate.publish(outputs.estimate(p, now, ground, frames))
         self._wind.publish(outputs.wind(p, now, frames))
-        if not profiled or self._config.path_rate <= 0.0:
+        if has_ellipse:
+            self._publish_rarely(p)
+
+    def _publish_rarely(self, p: Prediction) -> None:
+        discs = self._config.predictor.discs
+        self._likely = dict(zip(discs, p.weights.tolist(), strict=True))
+        if len(discs) > 1:
+            self._weights.publish(outputs.disc_weights(p.throw, self._likely))
+        if self._config.path_rate <= 0.0:
             return
         times, states = self._predictor.path(p, self._config.path_rate)
-        path = outputs.path([self._stamp(t) for t in times], states, ground, frames)
+        path = outputs.path([self._stamp(t) for t in times], states, self._ground, self._frames)
         self._path.publish(path)
-        crossing = outputs.intercept(path, self._config.intercept_height)
+        crossing = outputs.intercept(path, self._config.plane)
         if crossing is not None:
             self._intercept.publish(crossing)
 
@@ -195,12 +191,15 @@ class PredictorNode(Node):
         return max(0, (self._epoch or 0) + round(time * NANOSECONDS))
 
     def _publish_diagnostics(self) -> None:
-        values = {
+        values: dict[str, object] = {
             'throws': self._predictor.throws,
             'predictions': self.predictions,
             'refused measurements': self.refused,
             'late or repeated measurements': self._predictor.late,
         }
+        if len(self._likely) > 1:
+            weights = outputs.disc_weights(self._throw, self._likely).values
+            values |= {f'weight of {v.key}': v.value for v in weights}
         status = DiagnosticStatus(
             level=DiagnosticStatus.OK,
             name=f'{self.get_fully_qualified_name()}: prediction',

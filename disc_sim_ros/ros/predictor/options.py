@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.predictor import PredictorConfig
 from disc_sim_ros.estimation.predictor_options import predictor_config
@@ -22,6 +23,14 @@ _ZEROS = (0.0, 0.0, 0.0)
 PREDICTOR_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
     'What flies': (
         ParameterSpec('disc', 'ultrastar', 'fixed', 'Disc, as for `sim_node`.'),
+        ParameterSpec(
+            'discs',
+            '',
+            'fixed',
+            'Discs of which one is thrown; measurements tell how likely each is. Empty: `disc`.',
+            constraint='discs as for `disc`, separated by spaces, or a list',
+            listed=True,
+        ),
         *(spec_of(quantity, 'fixed') for quantity in PREDICTION.values()),
         ParameterSpec(
             'wind', _ZEROS, 'fixed', 'Wind that is expected, in `map`.', MEAN_WIND['wind_x']
@@ -63,9 +72,39 @@ PREDICTOR_GROUPS: Mapping[str, Sequence[ParameterSpec]] = {
         spec_of(PREDICTOR_NODE['ellipse_rate'], 'fixed'),
         spec_of(PREDICTOR_NODE['predicted_path_rate'], 'fixed'),
         spec_of(PREDICTOR_NODE['intercept_height'], 'fixed'),
+        ParameterSpec(
+            'intercept_plane_normal',
+            _ZEROS,
+            'fixed',
+            'Normal, of any length, in `map`, of a plane in which `intercept` is, in place of a '
+            'height; 0, 0, 0: the height.',
+            PREDICTOR_NODE['intercept_plane_normal'],
+        ),
+        ParameterSpec(
+            'intercept_plane_point',
+            _ZEROS,
+            'fixed',
+            'A point of this plane, in `map`.',
+            POSITION,
+        ),
     ),
 }
 PREDICTOR_TABLE = tuple(spec for group in PREDICTOR_GROUPS.values() for spec in group)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Where a disc is to be caught: a plane in `map`.
+
+    Attributes:
+        normal: Of any length.
+        point: A point of the plane [m].
+        both_ways: Also where the path crosses it in the direction of the normal.
+    """
+
+    normal: Vector
+    point: Vector
+    both_ways: bool
 
 
 @dataclass(frozen=True)
@@ -79,9 +118,9 @@ class NodeConfig:
         position: Its origin in `map` [m].
         rotation: Its rotation in `map`, a quaternion, scalar first.
         added_noise: Standard deviation of what is added to each coordinate [m].
-        ellipse_period: Time between two profiled ellipses [s].
+        ellipse_period: Time between two ellipses [s].
         path_rate: Points of `predicted_path` a second [Hz]; 0: no path.
-        intercept_height: z in `map` at which the disc is to be caught [m].
+        plane: Where `intercept` is.
     """
 
     predictor: PredictorConfig
@@ -92,7 +131,7 @@ class NodeConfig:
     added_noise: float
     ellipse_period: float
     path_rate: float
-    intercept_height: float
+    plane: Plane
 
 
 def node_config(values: Mapping[str, object]) -> NodeConfig:
@@ -108,10 +147,12 @@ def node_config(values: Mapping[str, object]) -> NodeConfig:
             raise ConfigError('sources', name, f'choose from {", ".join(SOURCES)}')
     if not sources:
         raise ConfigError('sources', '', f'choose from {", ".join(SOURCES)}')
-    setup = Setup(disc=disc_file.load_disc(v['disc']), wind=Wind(mean=flip_yz(v['wind'])))
+    wind = Wind(mean=flip_yz(v['wind']))
+    names = v['discs'].split() or [v['disc']]
+    setups = [Setup(disc=disc_file.load_disc(name), wind=wind) for name in names]
     roll, pitch, yaw = v['frame_rotation']
     return NodeConfig(
-        predictor=predictor_config(setup, {name: v[name] for name in PREDICTION}),
+        predictor=predictor_config(setups, {name: v[name] for name in PREDICTION}),
         sources=sources,
         frame=v['measurement_frame'],
         position=v['frame_position'],
@@ -119,8 +160,18 @@ def node_config(values: Mapping[str, object]) -> NodeConfig:
         added_noise=v['added_noise'],
         ellipse_period=1.0 / v['ellipse_rate'],
         path_rate=v['predicted_path_rate'],
-        intercept_height=v['intercept_height'],
+        plane=_plane(v),
     )
+
+
+def _plane(v: Mapping[str, Any]) -> Plane:
+    """Return the plane of `intercept`: of its normal if one is given, else of its height."""
+    normal, point = v['intercept_plane_normal'], v['intercept_plane_point']
+    if any(normal):
+        return Plane(normal, point, both_ways=True)
+    if any(point):
+        raise ConfigError('intercept_plane_normal', normal, 'give the normal of the plane')
+    return Plane((0.0, 0.0, 1.0), (0.0, 0.0, v['intercept_height']), both_ways=False)
 
 
 def is_plain(config: NodeConfig) -> bool:

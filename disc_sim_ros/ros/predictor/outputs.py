@@ -1,9 +1,10 @@
 """Messages of a prediction."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
 import numpy as np
@@ -14,6 +15,7 @@ from disc_sim_ros.estimation.ellipse import half_axes
 from disc_sim_ros.estimation.predictor import Prediction
 from disc_sim_ros.physics.frames import map_from_paper, odometry_array, rotation_matrix
 from disc_sim_ros.ros import messages
+from disc_sim_ros.ros.predictor.options import Plane
 from disc_sim_ros.topics import Frames
 from disc_sim_ros.units import NANOSECONDS
 
@@ -71,23 +73,37 @@ def path(stamps: Sequence[int], states: FloatArray, ground: float, frames: Frame
     return m
 
 
-def intercept(m: Path, height: float) -> PoseStamped | None:
-    """Return where a path crosses a height downwards, with its time; None if it does not."""
-    for a, b in zip(m.poses, m.poses[1:], strict=False):
-        high, low = a.pose.position.z, b.pose.position.z
-        if high >= height > low:
-            share = (high - height) / (high - low)
-            begin, end = _nanoseconds(a), _nanoseconds(b)
-            crossing = PoseStamped()
-            stamp = begin + round(share * (end - begin))
-            _set(crossing.header, a.header.frame_id, stamp)
-            p, q = a.pose.position, b.pose.position
-            crossing.pose.position.x = p.x + share * (q.x - p.x)
-            crossing.pose.position.y = p.y + share * (q.y - p.y)
-            crossing.pose.position.z = height
-            crossing.pose.orientation = a.pose.orientation
-            return crossing
-    return None
+def intercept(m: Path, plane: Plane) -> PoseStamped | None:
+    """Return where a path first crosses a plane, with its time; None if it does not."""
+    normal, point = np.array(plane.normal), np.array(plane.point)
+    at = np.array([[q.x, q.y, q.z] for q in (p.pose.position for p in m.poses)])
+    over = (at - point) @ normal
+    crossed = (over[:-1] >= 0.0) & (over[1:] < 0.0)
+    if plane.both_ways:
+        crossed |= (over[:-1] <= 0.0) & (over[1:] > 0.0)
+    if not crossed.any():
+        return None
+    i = int(np.argmax(crossed))
+    share = over[i] / (over[i] - over[i + 1])
+    begin, end = _nanoseconds(m.poses[i]), _nanoseconds(m.poses[i + 1])
+    crossing = PoseStamped()
+    _set(crossing.header, m.header.frame_id, begin + round(share * (end - begin)))
+    x, y, z = (at[i] + share * (at[i + 1] - at[i])).tolist()
+    position = crossing.pose.position
+    position.x, position.y, position.z = x, y, z
+    crossing.pose.orientation = m.poses[i].pose.orientation
+    return crossing
+
+
+def disc_weights(throw: int, weights: Mapping[str, float]) -> DiagnosticStatus:
+    """Return how likely each disc is, the most likely first."""
+    likely = sorted(weights.items(), key=lambda item: -item[1])
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=f'throw {throw}',
+        message=likely[0][0],
+        values=[KeyValue(key=name, value=f'{weight:.6f}') for name, weight in likely],
+    )
 
 
 def wind(p: Prediction, stamp: int, frames: Frames) -> Vector3Stamped:
