@@ -9,7 +9,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import coefficients, information, profile
+from disc_sim_ros.estimation import coefficients, errors, information, marginal, profile
 from disc_sim_ros.estimation.coefficients import NAMES, Base, base_of
 from disc_sim_ros.estimation.fitting import (
     BETTER,
@@ -35,7 +35,6 @@ from disc_sim_ros.quantities import COEFFICIENT_SPREAD
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
 _START_SPREAD = 0.5  # of the prior: how far other starts lie
 _START_STEPS = 12
-_PROFILES = 4  # at most: one may meet parameters that fit better
 _ROUNDS = 2  # of estimating the noise and fitting with it
 
 
@@ -213,17 +212,21 @@ def identify(
             best = Best(x)
             x = solve(problem, x, best=best, progress=progress, stage='noise').x
         best = Best(x)
-        x, stretches = _profiled(problem, x, best, progress)
+        result = errors.errors(problem, x, best, progress)
     except KeyboardInterrupt:
         if not best.x.size or best.x.size != problem.size:
             raise
-        interrupted, x = True, best.x
-        stretches = np.ones(len(problem.free))
-    known = information.information(problem, x)
-    factors = np.concatenate([stretches, np.ones(problem.size - len(stretches))])
-    covariance = known.covariance() * np.outer(factors, factors)
+        interrupted = True
+        result = errors.by_curvature(problem, best.x)
     return Identification(
-        problem, x, covariance, known.widening, stretches, tuple(left_out), interrupted, seed
+        problem,
+        result.x,
+        result.covariance,
+        result.widening,
+        result.stretches,
+        tuple(left_out),
+        interrupted,
+        seed,
     )
 
 
@@ -235,6 +238,7 @@ def stages(throws: int, starts: int) -> tuple[str, ...]:
         'fit',
         *(_without_stage(k, throws) for k in range(throws if throws > 1 else 0)),
         'noise',
+        marginal.STAGE,
         profile.STAGE,
     )
 
@@ -331,19 +335,6 @@ def _without_each(
         if again.cost < cost - BETTER:
             problem, x, cost = other, again.x, again.cost
     return problem, x
-
-
-def _profiled(
-    problem: Problem, x: FloatArray, best: Best, progress: Progress | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the best parameters and the stretches of the standard errors."""
-    for _ in range(_PROFILES):
-        curvature = information.information(problem, x).white_covariance()
-        result = profile.profiled(problem, x, curvature, progress)
-        if result.better is None:
-            break
-        x = solve(problem, result.better, best=best, progress=progress, stage='noise').x
-    return x, result.stretches
 
 
 def _identifiable(

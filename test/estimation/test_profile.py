@@ -1,6 +1,5 @@
 """Standard errors where the sum of squares is no parabola."""
 
-from dataclasses import replace
 import math
 
 import numpy as np
@@ -8,46 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from disc_sim_ros.estimation import information, profile
-from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
-from disc_sim_ros.estimation.fitting import solve
-from disc_sim_ros.estimation.observations import NOISE
-from disc_sim_ros.estimation.problem import Prior, Problem
-from disc_sim_ros.estimation.throws import throw_of
-from disc_sim_ros.physics.disc_file import load_disc
-from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.quantities import COEFFICIENT_SPREAD
-from estimation import synthetic_sessions
-
-BASE = Setup(disc=load_disc('ultrastar'))
-
-
-def damping_problem(kinds: tuple[str, ...], damping: float) -> tuple[Problem, np.ndarray]:
-    """Return one throw without noise, of a disc with another damping, and the best parameters."""
-    base = base_of(BASE)
-    values = base.values.copy()
-    place = NAMES.index('damping')
-    values[place] = damping
-    setup = replace(BASE, disc=disc_with(base, values, 'true', ''), step=5e-4)
-    launch = Launch(
-        speed=17.0, pitch=10.0, angle_of_attack=4.0, spin=60.0, height=1.3, roll_rate=2
-    )
-    generator = np.random.default_rng(1)
-    none = dict.fromkeys(kinds, 0.0)
-    made = synthetic_sessions.measured(launch, setup, kinds, generator, noise=none)
-    throw = replace(throw_of('one', made, BASE.disc, spin=60.0), start=np.array(launch.state()))
-    problem = Problem(
-        setup=BASE,
-        base=base,
-        free=(place,),
-        throws=(throw,),
-        prior=Prior(np.array([COEFFICIENT_SPREAD[name] for name in NAMES])),
-        noise=NOISE,
-        held=values,
-    )
-    x = problem.means.copy()
-    x[0] = damping
-    return problem, solve(problem, x).x
+from disc_sim_ros.estimation.problem import Problem
+from estimation.one_throw import damping_problem
 
 
 def deviation(problem: Problem, x: np.ndarray) -> tuple[np.ndarray, float]:
