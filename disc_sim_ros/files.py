@@ -138,7 +138,8 @@ def check_new_folder(flag: str, folder: Path) -> None:
         folder: Its path.
 
     Raises:
-        ConfigError: It exists, or the path has no name of a folder.
+        ConfigError: It exists, the path has no name of a folder, or the nearest folder above it
+            that exists is a file or read-only.
     """
     problem = ''
     try:
@@ -146,10 +147,21 @@ def check_new_folder(flag: str, folder: Path) -> None:
             problem = 'give the name of a new folder'
         elif folder.exists() or folder.is_symlink():
             problem = 'it exists already, and is never overwritten'
+        else:
+            _check_parent(folder)
     except (OSError, ValueError) as error:  # a name too long, or with a NUL
         problem = _not_made(error)
     if problem:
         raise ConfigError(flag, str(folder), problem)
+
+
+def _check_parent(folder: Path) -> None:
+    """Raise the OSError that making a folder with its parents would raise, if it is known."""
+    parent = next(path for path in folder.absolute().parents if path.exists())
+    if not parent.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+    if not os.access(parent, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def new_folder(flag: str, folder: Path) -> Path:

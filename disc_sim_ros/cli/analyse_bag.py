@@ -32,7 +32,7 @@ def parser(prog: str = 'analyse_bag') -> Parser:
         epilog='Exit code 0; 1: the bag is damaged; 2: bad input; 3: --verify found a difference, '
         'or nothing to verify.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(prog=prog, outputs={'plot': output.check_plot, **pages.CHECKS})
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     p.add_argument('bag', type=path, metavar='BAG', help='folder of the bag, or one .mcap file')
     p.add_argument(
@@ -69,8 +69,6 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'analyse_bag') -> i
 
 def _run(chosen: argparse.Namespace) -> int:
     plot = getattr(chosen, 'plot', None)
-    if plot is not None:
-        output.check_plot(plot)
     # Imported once the flags are known to be right: they take a second.
     from disc_sim_ros.analysis import bag_analysis, flights, recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
@@ -104,7 +102,7 @@ def _run(chosen: argparse.Namespace) -> int:
         if plot is not None:
             lines.append(f'wrote {plot}')
         output.show('\n'.join(lines))
-    if pages.is_wanted(chosen):  # after the numbers: they come even if it cannot be written
+    if pages.is_wanted(chosen):  # after the numbers: they come even if the disk is full
         line = _write_page(chosen, every)
         if chosen.json:
             output.note(chosen.prog, line)

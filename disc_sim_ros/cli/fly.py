@@ -30,7 +30,15 @@ def parser(prog: str = 'fly') -> Parser:
         f'Angles and control inputs have the signs of {flags.PAPER}; positions, velocities and '
         'wind are in map axes: x forward, y left, z up.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(
+        prog=prog,
+        outputs={
+            'csv': _check_csv,
+            'bag': _check_bag,
+            'plot': output.check_plot,
+            **pages.CHECKS,
+        },
+    )
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     flags.add_disc(p, several=True)
     flags.add_launch(p)
@@ -97,13 +105,22 @@ def _in_flags(error: ConfigError, chosen: argparse.Namespace, parser: Parser) ->
     return flags.in_flags(error, chosen, parser)
 
 
+def _check_csv(name: str) -> None:
+    if name != STDOUT:
+        output.check_writable('--csv', name)
+
+
+def _check_bag(name: str) -> None:
+    files.check_new_folder('bag', Path(name))
+
+
 def _run(chosen: argparse.Namespace) -> int:
     several = hasattr(chosen, 'techdisc') or len(getattr(chosen, 'discs', ())) > 1
     report = _compare if several or chosen.units != 'metric' else _report
     flown = report(chosen)
     if not pages.is_wanted(chosen):
         return 0
-    # After the numbers: they come even if the page cannot be written.
+    # After the numbers: they come even if the disk is full.
     line = _write_page(chosen, flown)
     if chosen.json or getattr(chosen, 'csv', None) == STDOUT:
         output.note(chosen.prog, line)
@@ -115,10 +132,6 @@ def _run(chosen: argparse.Namespace) -> int:
 def _report(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     """Fly one disc and show its flight."""
     csv, plot, bag = (getattr(chosen, name, None) for name in ('csv', 'plot', 'bag'))
-    if csv not in {None, STDOUT}:
-        output.check_writable('--csv', csv)
-    if plot is not None:
-        output.check_plot(plot)
     in_file = csv is not None or plot is not None
     rate = getattr(chosen, 'samples', DEFAULT_RATE if in_file else 0.0)
     sampled = rate if bag is None else 0.0
@@ -249,7 +262,6 @@ def _bag_writer(
     except ImportError as error:
         allowed = f'it needs rclpy and the message packages of ROS 2 Jazzy ({error})'
         raise ConfigError('--bag', bag, allowed) from None
-    files.check_new_folder('bag', Path(bag))
     flight.check_flight(
         release, setup, chosen.duration, ground=not chosen.no_ground, sample_rate=0.0
     )

@@ -50,7 +50,7 @@ def parser(prog: str = 'identify') -> Parser:
         epilog='Exit code 0; 1: a bag cannot be read, or a file not be written; 2: bad input; '
         '130: Ctrl-C, after the best result so far.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(prog=prog, outputs={'out': _check_disc_file, 'report': _check_report})
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     p.add_argument(
         'throws',
@@ -159,7 +159,6 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'identify') -> int:
 
 
 def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
-    _check_outputs(chosen)
     setup = flight.Setup(
         disc=disc_file.load_disc(chosen.disc),
         model=chosen.model,
@@ -199,14 +198,14 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     return 130 if result.interrupted else 0
 
 
-def _check_outputs(chosen: argparse.Namespace) -> None:
-    """Refuse files that cannot be written, before anything is computed."""
-    if hasattr(chosen, 'out'):
-        if not disc_file.is_file(chosen.out):
-            raise ConfigError('--out', chosen.out, 'give a name that ends in .yaml')
-        output.check_writable('--out', chosen.out)
-    if hasattr(chosen, 'report'):
-        files.check_new_folder('--report', Path(chosen.report))
+def _check_disc_file(name: str) -> None:
+    if not disc_file.is_file(name):
+        raise ConfigError('--out', name, 'give a name that ends in .yaml')
+    output.check_writable('--out', name)
+
+
+def _check_report(name: str) -> None:
+    files.check_new_folder('--report', Path(name))
 
 
 def _write_outputs(

@@ -33,7 +33,8 @@ def run_program(
     """Parse the arguments, run a program and return its exit code.
 
     Args:
-        parser: The command line of the program.
+        parser: The command line of the program; its default `outputs` has the checks of the
+            files and folders that it writes, see `output.check_outputs`.
         run: The program: takes the parsed arguments and returns an exit code.
         arguments: Words of the command line; None for those of this process.
         in_flags: Returns an error under the name of the flag that gave the refused value; None
@@ -47,6 +48,7 @@ def run_program(
         with output.flushed_stdout():
             chosen = parser.parse_args(arguments)
             try:
+                output.check_outputs(chosen)
                 return run(chosen)
             except UsageError as error:
                 parser.error(str(error))

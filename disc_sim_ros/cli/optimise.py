@@ -38,7 +38,7 @@ def parser(prog: str = 'optimise') -> Parser:
         epilog=f'{_defaults_text()} {study_flags.names_text()} Exit code 0; 1: the search '
         'failed; 2: bad input.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(prog=prog, outputs={'plot': output.check_plot})
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     study_flags.add_throw(p, ground=False)
     what = p.add_argument_group('goal and search')
@@ -144,8 +144,6 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
 
 def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     plot = getattr(chosen, 'plot', None)
-    if plot is not None:
-        output.check_plot(plot)
     posed = problem(chosen, words)
     from disc_sim_ros.studies import optimise, optimise_report  # noqa: PLC0415
 

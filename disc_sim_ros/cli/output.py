@@ -1,7 +1,7 @@
 """Output of programs: files, complete or not at all, and text on stdout and stderr."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 import io
 import os
@@ -19,6 +19,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PLOTS = ('png', 'svg', 'pdf')
+
+
+def check_outputs(chosen: argparse.Namespace) -> None:
+    """Refuse every file and folder that a program cannot write, before it begins its work.
+
+    A parser names them with `set_defaults(outputs={dest: check})`: the `dest` of a flag, and a
+    function that takes its value.
+
+    Raises:
+        ConfigError: As of the checks.
+    """
+    checks: Mapping[str, Callable[[str], None]] = getattr(chosen, 'outputs', {})
+    for dest, check in checks.items():
+        value = getattr(chosen, dest, None)
+        if value is not None and value is not False:
+            check(value)
 
 
 def add_plot(group: argparse._ActionsContainer) -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.view.shown import ShownFlight
 
 RATE = 200.0  # samples per second of a flight in a page, without --samples
+FOLDER = 'flights'  # of pages without a name
 NO_BROWSER = 'no browser was opened: there is no screen, or no browser'
 
 
@@ -37,6 +38,24 @@ def add_page(group: argparse._ActionsContainer) -> None:
         action='store_true',
         help='open the page in a browser; without --html the file is flights/DATE_TIME.html',
     )
+
+
+def _check_html(name: str) -> None:
+    output.check_writable('--html', name)
+
+
+def _check_view(_: object) -> None:
+    folder = Path(FOLDER)
+    reason = ''
+    if folder.exists() and not folder.is_dir():
+        reason = 'File exists'
+    elif not os.access(folder if folder.exists() else Path(), os.W_OK):
+        reason = 'Permission denied'
+    if reason:
+        raise _no_folder(reason)
+
+
+CHECKS = {'html': _check_html, 'view': _check_view}  # for `output.check_outputs`
 
 
 def is_wanted(chosen: argparse.Namespace) -> bool:
@@ -89,7 +108,6 @@ def write(
     content = page(flights, title, SYSTEMS[units])
     name = getattr(chosen, 'html', None) or _new_name()
     flag = '--html' if hasattr(chosen, 'html') else '--view'
-    output.check_writable(flag, name)
     output.write_whole(flag, name, content)
     if chosen.view and not opened(Path(name)):
         output.note(chosen.prog, f'note: {NO_BROWSER}')
@@ -115,12 +133,16 @@ def _new_name() -> str:
     Raises:
         ConfigError: The folder cannot be made.
     """
-    folder = Path('flights')
+    folder = Path(FOLDER)
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        allowed = f'cannot make the folder flights ({error.strerror}); give --html FILE.html'
-        raise ConfigError('--view', str(folder), allowed) from None
+        raise _no_folder(error.strerror) from None
     stem = f'{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
     names = (f'{stem}.html', *(f'{stem}_{number}.html' for number in range(2, 1000)))
     return str(next(folder / name for name in names if not (folder / name).exists()))
+
+
+def _no_folder(reason: str) -> ConfigError:
+    allowed = f'cannot make the folder {FOLDER} ({reason}); give --html FILE.html'
+    return ConfigError('--view', FOLDER, allowed)

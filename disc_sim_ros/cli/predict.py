@@ -41,7 +41,7 @@ def parser(prog: str = 'predict') -> Parser:
         'measured, qx, qy, qz, qw; a column `throw` separates several.',
         epilog='Exit code 0; 1 if no throw was found; 2 for bad input.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(prog=prog, outputs={'plot': output.check_plot, **pages.CHECKS})
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     p.add_argument('source', type=path, metavar='FILE', help='a bag or a CSV file')
     p.add_argument('--topic', help='the topic of the bag (default: the only one that moves)')
@@ -78,8 +78,6 @@ def _run(chosen: argparse.Namespace) -> int:
     from disc_sim_ros.estimation.replay import replay  # noqa: PLC0415
 
     plot = getattr(chosen, 'plot', None)
-    if plot is not None:
-        output.check_plot(plot)
     config = _config(chosen)
     series = _measurements(chosen)
     note = first_call_note()
@@ -96,7 +94,7 @@ def _run(chosen: argparse.Namespace) -> int:
         output.show('\n\n'.join(_summary(throw, config.discs) for throw in throws))
     if plot is not None:
         output.write_plot(plot, _figure(throws))
-    if pages.is_wanted(chosen):  # after the numbers: they come even if it cannot be written
+    if pages.is_wanted(chosen):  # after the numbers: they come even if the disk is full
         line = _write_page(chosen, throws, config)
         if chosen.json:
             output.note(chosen.prog, line)

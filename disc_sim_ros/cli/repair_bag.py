@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 import sys
 
-from disc_sim_ros import __version__
+from disc_sim_ros import __version__, files
 from disc_sim_ros.cli import output
 from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import run_program
@@ -26,7 +26,7 @@ def parser(prog: str = 'repair_bag') -> Parser:
         epilog='Exit code 0: OUT is a complete bag, even if messages of IN were lost; 1: OUT '
         'could not be made, or nothing of IN can be kept; 2: bad input.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(prog=prog, outputs={'target': _check_target})
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     p.add_argument(
         'source', type=path, metavar='IN', help='folder of a bag, or an .mcap or .mcap.zstd file'
@@ -41,6 +41,10 @@ def parser(prog: str = 'repair_bag') -> Parser:
 def main(arguments: Sequence[str] | None = None, prog: str = 'repair_bag') -> int:
     """Run `repair_bag` and return its exit code: 0, 1 for a failed repair, 2 for bad input."""
     return run_program(parser(prog), _run, arguments)
+
+
+def _check_target(name: str) -> None:
+    files.check_new_folder('OUT', Path(name))
 
 
 def _run(chosen: argparse.Namespace) -> int:

@@ -40,7 +40,10 @@ def parser(prog: str = 'sweep') -> Parser:
         epilog=f'{study_flags.names_text()} Exit code 0; 1: the sweep failed; 2: bad input; 130: '
         'Ctrl-C. Finished flights are kept in FILE.parts, and --resume continues from there.',
     )
-    p.set_defaults(prog=prog)
+    p.set_defaults(
+        prog=prog,
+        outputs={'plot': output.check_plot, 'output': partial(output.check_writable, '--output')},
+    )
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     study_flags.add_throw(p)
     what = p.add_argument_group('differences from flight to flight')
@@ -105,9 +108,6 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'sweep') -> int:
 
 def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     plot = getattr(chosen, 'plot', None)
-    if plot is not None:
-        output.check_plot(plot)
-    output.check_writable('--output', chosen.output)
     study = study_of(chosen, words)
     # Only now: pyarrow takes a quarter of a second.
     from disc_sim_ros.studies import report, runner, summary  # noqa: PLC0415
