@@ -8,24 +8,24 @@ from setuptools import Distribution, find_packages, setup
 
 NAME = 'disc_sim_ros'
 
-# A new executable is one line here, one in cli/disc_sim.py and one file in scripts/, a copy of
-# scripts/fly with another name.
+# A new executable is one line here, one in cli/disc_sim.py, its functions in cli/start.py unless
+# it is a node, and one file in scripts/, a copy of scripts/fly with another name.
 EXECUTABLES = {
-    'analyse_bag': 'disc_sim_ros.cli.analyse_bag:main',
-    'demo': 'disc_sim_ros.cli.demo:main',
-    'disc-sim': 'disc_sim_ros.cli.disc_sim:main',
-    'fly': 'disc_sim_ros.cli.fly:main',
-    'identify': 'disc_sim_ros.cli.identify:main',
+    'analyse_bag': 'disc_sim_ros.cli.start:analyse_bag',
+    'demo': 'disc_sim_ros.cli.start:demo',
+    'disc-sim': 'disc_sim_ros.cli.start:disc_sim',
+    'fly': 'disc_sim_ros.cli.start:fly',
+    'identify': 'disc_sim_ros.cli.start:identify',
     'live_view': 'disc_sim_ros.cli.live_view:main',
-    'optimise': 'disc_sim_ros.cli.optimise:main',
-    'paper_figures': 'disc_sim_ros.cli.paper_figures:main',
+    'optimise': 'disc_sim_ros.cli.start:optimise',
+    'paper_figures': 'disc_sim_ros.cli.start:paper_figures',
     'policy_node': 'disc_sim_ros.cli.policy_node:main',
-    'predict': 'disc_sim_ros.cli.predict:main',
+    'predict': 'disc_sim_ros.cli.start:predict',
     'predictor_node': 'disc_sim_ros.cli.predictor_node:main',
     'recorder_node': 'disc_sim_ros.cli.recorder_node:main',
-    'repair_bag': 'disc_sim_ros.cli.repair_bag:main',
+    'repair_bag': 'disc_sim_ros.cli.start:repair_bag',
     'sim_node': 'disc_sim_ros.cli.sim_node:main',
-    'sweep': 'disc_sim_ros.cli.sweep:main',
+    'sweep': 'disc_sim_ros.cli.start:sweep',
 }
 
 SHARED_FOLDERS = ('config', 'launch', 'urdf', 'rviz', 'security')

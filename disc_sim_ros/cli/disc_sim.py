@@ -3,80 +3,19 @@
 import argparse
 from collections.abc import Callable, Sequence
 import sys
-from typing import Protocol
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output
+from disc_sim_ros.cli import output, start
 from disc_sim_ros.cli.arguments import Parser
 from disc_sim_ros.cli.main import run_program
+from disc_sim_ros.cli.start import Program
 
 
-class Program(Protocol):
-    """The `main` of a program."""
-
-    def __call__(self, arguments: Sequence[str] | None = None, prog: str = ...) -> int:
-        """Run the program under the name `prog` and return its exit code."""
-
-
-# Each is imported when it is called: `fly` alone takes a quarter of a second.
-def _fly() -> Program:
-    from disc_sim_ros.cli import fly  # noqa: PLC0415
-
-    return fly.main
-
-
-def _sweep() -> Program:
-    from disc_sim_ros.cli import sweep  # noqa: PLC0415
-
-    return sweep.main
-
-
-def _optimise() -> Program:
-    from disc_sim_ros.cli import optimise  # noqa: PLC0415
-
-    return optimise.main
-
-
-def _identify() -> Program:
-    from disc_sim_ros.cli import identify  # noqa: PLC0415
-
-    return identify.main
-
-
-def _demo() -> Program:
-    from disc_sim_ros.cli import demo  # noqa: PLC0415
-
-    return demo.main
-
-
-def _predict() -> Program:
-    from disc_sim_ros.cli import predict  # noqa: PLC0415
-
-    return predict.main
-
-
+# Each is imported when it is called, as the other programs are in `start`.
 def _predictor_node() -> Program:
     from disc_sim_ros.cli import predictor_node  # noqa: PLC0415
 
     return predictor_node.main
-
-
-def _analyse_bag() -> Program:
-    from disc_sim_ros.cli import analyse_bag  # noqa: PLC0415
-
-    return analyse_bag.main
-
-
-def _repair_bag() -> Program:
-    from disc_sim_ros.cli import repair_bag  # noqa: PLC0415
-
-    return repair_bag.main
-
-
-def _paper_figures() -> Program:
-    from disc_sim_ros.cli import paper_figures  # noqa: PLC0415
-
-    return paper_figures.main
 
 
 def _sim_node() -> Program:
@@ -104,20 +43,23 @@ def _live_view() -> Program:
 
 
 PROGRAMS: dict[str, tuple[Callable[[], Program], str]] = {
-    'fly': (_fly, 'compute one flight: summary, JSON, CSV, plot or bag'),
-    'sweep': (_sweep, 'compute grids and random ensembles of flights into one file'),
-    'optimise': (_optimise, 'find the launch with the best range, time or accuracy'),
-    'identify': (_identify, 'find the coefficients of a disc from measured throws'),
-    'demo': (_demo, 'throw in real time, record and analyse the flight (ROS 2)'),
+    'fly': (start.load_fly, 'compute one flight: summary, JSON, CSV, plot or bag'),
+    'sweep': (start.load_sweep, 'compute grids and random ensembles of flights into one file'),
+    'optimise': (start.load_optimise, 'find the launch with the best range, time or accuracy'),
+    'identify': (start.load_identify, 'find the coefficients of a disc from measured throws'),
+    'demo': (start.load_demo, 'throw in real time, record and analyse the flight (ROS 2)'),
     'sim_node': (_sim_node, 'run the simulator node (ROS 2)'),
     'recorder_node': (_recorder_node, 'run the recorder node (ROS 2)'),
     'policy_node': (_policy_node, 'steer the disc by a learned policy (ROS 2)'),
     'live_view': (_live_view, 'show the running simulators in a browser (ROS 2)'),
     'predictor_node': (_predictor_node, 'predict where a disc lands while it flies (ROS 2)'),
-    'predict': (_predict, 'predict the landings of recorded throws'),
-    'analyse_bag': (_analyse_bag, 'summarise, verify or plot the flights in a bag'),
-    'repair_bag': (_repair_bag, 'copy what a damaged bag still holds into a complete one'),
-    'paper_figures': (_paper_figures, 'compute the figures of Crowther & Potts (2007)'),
+    'predict': (start.load_predict, 'predict the landings of recorded throws'),
+    'analyse_bag': (start.load_analyse_bag, 'summarise, verify or plot the flights in a bag'),
+    'repair_bag': (
+        start.load_repair_bag,
+        'copy what a damaged bag holds into a complete one',
+    ),
+    'paper_figures': (start.load_paper_figures, 'compute the figures of Crowther & Potts (2007)'),
 }
 
 
@@ -143,7 +85,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words and words[0] in PROGRAMS:
         load, _ = PROGRAMS[words[0]]
-        return load()(words[1:], f'disc-sim {words[0]}')
+        with start.ended_by_ctrl_c():
+            program = load()
+        return program(words[1:], f'disc-sim {words[0]}')
     p = parser()
 
     def show_help(_: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ import sys
 import time
 
 from disc_sim_ros import __version__, files
-from disc_sim_ros.cli import flags, output, pages
+from disc_sim_ros.cli import flags, output, pages, start
 from disc_sim_ros.cli.arguments import Parser, add_quantity, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError
@@ -237,7 +237,7 @@ def _fly(
         output.note(chosen.prog, f'note: --roll-rate and --pitch-rate have no effect: {text}')
     if text := flight.first_call_note():
         output.note(chosen.prog, f'note: {text}')
-    with output.ended_by_ctrl_c():
+    with start.ended_by_ctrl_c():
         return flight.fly(
             release,
             setup,

@@ -6,9 +6,7 @@ from contextlib import contextmanager
 import io
 import os
 from pathlib import Path
-import signal
 import sys
-import threading
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import files
@@ -155,19 +153,6 @@ def mend_streams() -> None:
             setattr(sys, name, io.StringIO())  # discarded
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
-
-
-@contextmanager
-def ended_by_ctrl_c() -> Iterator[None]:
-    """Let Ctrl-C end the process at once: compiled code runs no Python signal handler."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
 
 
 def _ending(name: str) -> str:

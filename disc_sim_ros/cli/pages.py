@@ -137,7 +137,7 @@ def _new_name() -> str:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise _no_folder(error.strerror) from None
+        raise _no_folder(str(error.strerror)) from None
     stem = f'{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
     names = (f'{stem}.html', *(f'{stem}_{number}.html' for number in range(2, 1000)))
     return str(next(folder / name for name in names if not (folder / name).exists()))

@@ -13,7 +13,7 @@ import time
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output
+from disc_sim_ros.cli import output, start
 from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
@@ -89,7 +89,7 @@ def _write_all(chosen: argparse.Namespace, folder: Path) -> None:
 
     if text := flight.first_call_note():
         output.note(chosen.prog, f'note: {text}')
-        with output.ended_by_ctrl_c():
+        with start.ended_by_ctrl_c():
             _compile()
     total = len(chosen.only)
     output.show(f'{total} parts into {folder}/, {min(chosen.jobs, total)} at a time')

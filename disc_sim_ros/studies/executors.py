@@ -60,15 +60,41 @@ def processes(workers: int) -> Iterator[Executor]:
 
 
 class _Processes(ProcessPoolExecutor):
-    """Starts its processes with SIGINT blocked: Ctrl-C cannot end one before `_begin_worker`."""
+    """Starts its processes undisturbed by Ctrl-C, and with SIGINT blocked until `_begin_worker`.
+
+    A process that starts reads from this one what it has to import. If Ctrl-C ended this process
+    in between, or the new one, the new one would show a traceback.
+    """
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        resource_tracker.ensure_running()  # it would unblock SIGINT when it starts
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        try:
-            return super().submit(function, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with _ctrl_c_waits():
+            resource_tracker.ensure_running()  # it would unblock SIGINT when it starts
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+            try:
+                return super().submit(function, *args, **kwargs)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _ctrl_c_waits() -> Iterator[None]:
+    """Hold Ctrl-C back until the end of the block; in the main thread, which alone handles it.
+
+    To block SIGINT is not enough: another thread, such as that of the executor, may take it, and
+    Python then runs the handler in the main thread all the same.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    held: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if held:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _begin_worker() -> None:

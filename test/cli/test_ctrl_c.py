@@ -1,0 +1,93 @@
+"""Ctrl-C at many moments: exit code 130 and no traceback, also while workers start."""
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+BIN = Path(sys.executable).parent
+ENDED = {130, -signal.SIGINT}  # both are 130 to a shell
+WORKERS = """
+import sys, time
+from disc_sim_ros.cli import start
+
+def main():
+    from disc_sim_ros.studies import executors
+    print('ready', flush=True)
+    with executors.processes(3) as pool:
+        for future in [pool.submit(time.sleep, 0.01 * k) for k in range(6)]:
+            future.result()
+    print('done', flush=True)
+    return 0
+
+if __name__ == '__main__':
+    sys.exit(start.run(lambda: main))
+"""
+
+
+@pytest.fixture
+def program(tmp_path) -> Path:
+    """A program that starts three workers as `sweep` and `paper_figures` do."""
+    path = tmp_path / 'workers.py'
+    path.write_text(WORKERS, encoding='utf-8')
+    return path
+
+
+def interrupted(command, delay, folder, *, ready='') -> tuple[int, str]:
+    """Send SIGINT to a program and its workers, `delay` s after its first line.
+
+    Without `ready`, after it has begun to import numpy: before, Python itself may still start,
+    which has tracebacks of its own.
+    """
+    process = subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    if ready:
+        assert ready in process.stdout.readline()
+    maps = Path(f'/proc/{process.pid}/maps')
+    while not ready and process.poll() is None and '/numpy/' not in maps.read_text():
+        time.sleep(0.001)
+    time.sleep(delay)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
+    _, error = process.communicate(timeout=120)
+    return process.returncode, error
+
+
+@pytest.mark.parametrize('delay', [k / 1000 for k in (0, 5, 12, 22, 33, 45)])
+def test_no_worker_shows_a_traceback_while_it_starts(program, tmp_path, delay):
+    code, error = interrupted([sys.executable, program], delay, tmp_path, ready='ready')
+    assert error == ''
+    assert code in ENDED
+
+
+def test_the_program_ends_as_usual_without_ctrl_c(program):
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ('ready\ndone\n', '')
+
+
+@pytest.mark.parametrize(
+    ('command', 'delay'),
+    [
+        (['fly', '--no-ground', '--duration', '3600'], 0.0),
+        (['sweep', '--scatter', 'pitch=1', '--count', '100000', '--step', '1e-4'], 0.02),
+        (['identify', 'none.csv'], 0.01),
+        (['disc-sim', 'predict', 'none.csv'], 0.0),
+    ],
+)
+def test_a_program_that_still_loads_ends_without_a_traceback(command, delay, tmp_path):
+    name, *words = command
+    code, error = interrupted([BIN / name, *words], delay, tmp_path)
+    assert error == ''
+    assert code in ENDED
+
+
+def test_paper_figures_ends_without_a_traceback_while_its_workers_start(tmp_path):
+    command = [BIN / 'paper_figures', '--only', '3,9', '--out', 'out']
+    code, error = interrupted(command, 0.02, tmp_path, ready='parts into')
+    assert error == ''
+    assert code in ENDED
