@@ -84,7 +84,7 @@ def main() -> None:
 
 def lines(*, write: bool = False) -> tuple[Line, ...]:
     """Measure and print every flight; return the savings of despun axes."""
-    setup = Setup(disc=disc_file.load_disc('frisbee_as_printed'))
+    setup = Setup(disc=disc_file.load_disc('frisbee_as_printed'), step=1e-3)
     throws = [landed(name, launch) for name, launch in LAUNCHES.items()]
     for throw in throws:
         check(throw, setup)

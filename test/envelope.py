@@ -18,7 +18,7 @@ from disc_sim_ros.physics.flight import MODELS, MOMENT_AXES, NO_CONTROL, Setup, 
 from disc_sim_ros.physics.kernels.equations import DISC, DISC_AIR, DISC_BODY, Control
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.simulator import FlightSimulator
-from disc_sim_ros.quantities import LAUNCH
+from disc_sim_ros.quantities import LAUNCH, STEP
 
 DISCS = {name: disc_file.load_disc(name) for name in disc_file.disc_names()}
 ANGLES = (0.0, 90.0, -90.0, 180.0, -180.0, 89.999, 1e-9, -1e-300)
@@ -61,6 +61,7 @@ def setups(draw, *, wind=CALM, axes=tuple(MOMENT_AXES), models=tuple(MODELS)):
         model=draw(st.sampled_from(models)),
         moment_axes=draw(st.sampled_from(axes)),
         wind=draw(wind),
+        step=STEP.default,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from disc_sim_ros import __version__
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import frames
-from disc_sim_ros.physics.flight import Flight
+from disc_sim_ros.physics.flight import Flight, Setup
 from disc_sim_ros.physics.theory import advance_ratio
 from disc_sim_ros.physics.trajectory import Trajectory
 
@@ -101,6 +101,13 @@ def csv_text(trajectory: Trajectory) -> str:
     return '\n'.join(lines) + '\n'
 
 
+def _steps(setup: Setup) -> str:
+    """Return how a flight is integrated, in words."""
+    if setup.step is None:
+        return 'error control'
+    return f'RK4 step {setup.step * 1e3:g} ms'
+
+
 def summary(flight: Flight) -> str:
     """Return a flight in a few lines to read."""
     launch, setup = flight.launch, flight.setup
@@ -114,7 +121,7 @@ def summary(flight: Flight) -> str:
     lines = [
         f'{setup.disc.name}: {setup.disc.description or "no description"}',
         f'  model   {setup.model}, {setup.aero or setup.disc.aero} aerodynamics, '
-        f'moments in {setup.moment_axes} axes, RK4 step {setup.step * 1e3:g} ms',
+        f'moments in {setup.moment_axes} axes, {_steps(setup)}',
         f'  launch  {launch.speed:g} m/s, pitch {launch.pitch:g}, roll {launch.roll:g}, '
         f'yaw {launch.yaw:g}, angle of attack {launch.angle_of_attack:g} degrees, '
         f'{launch.height:g} m up',

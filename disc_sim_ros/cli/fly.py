@@ -138,6 +138,8 @@ def _report(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     if pages.is_wanted(chosen):
         sampled = sampled or pages.RATE
     release, setup = flags.thrown(chosen)
+    if bag is not None:  # a bag holds a flight in even steps
+        setup = replace(setup, step=setup.fixed_step)
     write = None if bag is None else _bag_writer(chosen, bag, release, setup)
 
     flown = _fly(chosen, release, setup, sampled)

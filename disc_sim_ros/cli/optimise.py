@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 import json
 import math
@@ -86,7 +85,6 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
         ConfigError: Flags contradict each other, or a value is out of range.
     """
     from disc_sim_ros.studies import optimise  # noqa: PLC0415 - scipy
-    from disc_sim_ros.studies.flying import good_step  # noqa: PLC0415
     from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
     flags = {word.partition('=')[0] for word in words}
@@ -129,17 +127,13 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
         sampling='sobol' if scatter else 'random',
         duration=chosen.duration,
     )
-    posed = optimise.Problem(
+    return optimise.Problem(
         study=study,
         limits=limits,
         goal=chosen.goal,
         target=target,
         percentile=getattr(chosen, 'percentile', None),
     )
-    if hasattr(chosen, 'step'):
-        return posed
-    step = good_step(setup, posed.fastest_spin, posed.fastest_rate)
-    return replace(posed, study=replace(study, setup=replace(setup, step=step)))
 
 
 def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:

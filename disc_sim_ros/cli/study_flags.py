@@ -10,7 +10,7 @@ from disc_sim_ros.cli.arguments import Parser, add_quantity, range_text
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import ensemble, flight
 from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.quantities import LARGEST_SEED, STEP, STUDY, VARIED, WIND
+from disc_sim_ros.quantities import LARGEST_SEED, STUDY, VARIED, WIND
 from disc_sim_ros.studies.columns import quantity
 from disc_sim_ros.studies.scatter import Normal, Uniform
 from disc_sim_ros.validation import Quantity
@@ -118,7 +118,7 @@ def ranges(flag: str, texts: Iterable[str]) -> dict[str, tuple[float, float]]:
 
 
 def add_throw(p: Parser, *, ground: bool = True) -> None:
-    """Add the flags of a throw; the step is chosen where `--step` is not given.
+    """Add the flags of a throw.
 
     Args:
         p: A parser with `conflict_handler='resolve'`.
@@ -127,11 +127,7 @@ def add_throw(p: Parser, *, ground: bool = True) -> None:
     throw_flags.add_disc(p)
     throw_flags.add_launch(p)
     group = throw_flags.add_air(p, 'air, control inputs and end of the flight')
-    text = (
-        'integration step (default: the longest of 20, 10, 5, 2 and 1 ms in which the fastest '
-        'nutation turns by less than 1.3 rad, or 0.5 rad with weak damping)'
-    )
-    add_quantity(group, '--step', STEP, text=text, default=argparse.SUPPRESS)
+    throw_flags.add_step(group)
     throw_flags.add_duration(group)
     if ground:
         throw_flags.add_no_ground(group)
@@ -159,13 +155,10 @@ def add_workers(group: argparse._ActionsContainer) -> None:
 def thrown(chosen: argparse.Namespace) -> tuple[Launch, flight.Setup, float | None]:
     """Return the launch, the setup and the advance ratio, or None.
 
-    Where `--step` is not given, the setup has the shortest step, which suits every spin.
-
     Raises:
         ConfigError: As of `throw_flags.thrown`.
     """
-    values = vars(chosen) | {'step': getattr(chosen, 'step', STEP.lowest)}
-    release, setup = throw_flags.thrown(argparse.Namespace(**values))
+    release, setup = throw_flags.thrown(chosen)
     ratio = getattr(chosen, 'advance_ratio', None)
     return release, setup, ratio if ratio is None else ratio * throw_flags.sense(chosen)
 

@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 import json
@@ -156,7 +155,6 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
         UsageError: No flag makes the flights differ.
         ConfigError: Flags contradict each other, or a value is out of range.
     """
-    from disc_sim_ros.studies.flying import good_step  # noqa: PLC0415
     from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
     vary = study_flags.grids(listed(chosen, 'vary'))
@@ -174,7 +172,7 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
         )
     study_flags.check_given(words, vary, scatter)
     release, setup, ratio = study_flags.thrown(chosen)
-    study = Study(
+    return Study(
         setup=setup,
         launch=release,
         control=flags.control_of(chosen),
@@ -189,10 +187,6 @@ def study_of(chosen: argparse.Namespace, words: Sequence[str]) -> 'Study':
         duration=chosen.duration,
         ground=not chosen.no_ground,
     )
-    if hasattr(chosen, 'step'):
-        return study
-    step = good_step(setup, study.fastest_spin, study.fastest_rate)
-    return replace(study, setup=replace(setup, step=step))
 
 
 def _uncertainty(name: str) -> Mapping[str, float]:

@@ -205,7 +205,7 @@ class DiscVectorEnv(VectorEnv[Any, Any, Any]):
         flights = np.flatnonzero(ended)
         columns = self.simulator.present(flights)
         at = np.stack([columns[0], frames.flip(columns[1])], axis=1)
-        step = self.simulator.setup.step
+        step = self.simulator.setup.fixed_step
         info = {
             'landing': np.zeros((n, 2)),
             'miss': np.zeros(n),

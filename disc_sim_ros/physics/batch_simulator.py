@@ -191,7 +191,7 @@ class BatchSimulator:
             self.setup.plant,
             self._lanes_plant,
             self._inputs,
-            float(self.setup.step),
+            self.setup.fixed_step,
             self.ground,
         )
 

@@ -206,6 +206,25 @@ class Disc:
         return np.column_stack([alpha, C, np.append(alpha[1:], np.inf), slopes])
 
     @cached_property
+    def corner_rows(self) -> FloatArray:
+        """Return `table_rows` with a row at each corner of the spin tables too, shape (m, 8).
+
+        The coefficients are the same: flights with error control end steps at all corners.
+        """
+        rows, terms = self.table_rows, self.spin_terms
+        if len(terms) == 0:
+            return rows
+        corners = np.setdiff1d(terms[0, 0, 1:], rows[:, 0])
+        corners = corners[(corners > rows[0, 0]) & (corners < rows[-1, 0])]
+        added = rows[np.searchsorted(rows[:, 0], corners) - 1]
+        added[:, 1:4] += added[:, 5:] * (corners - added[:, 0])[:, np.newaxis]
+        added[:, 0] = corners
+        rows = np.vstack([rows, added])
+        rows = rows[np.argsort(rows[:, 0])]
+        rows[:, 4] = np.append(rows[1:, 0], np.inf)
+        return rows
+
+    @cached_property
     def spin_terms(self) -> FloatArray:
         """Return the spin tables as `aerodynamics.spin_coefficients` takes them; may be empty.
 

@@ -15,7 +15,12 @@ from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight, frames
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.kernels.batch import Ends, Workspace, fly_rows, fly_simd, workspace
+from disc_sim_ros.physics.kernels.adaptive_batch import (
+    adaptive_workspace,
+    fly_rows_adaptive,
+    fly_simd_adaptive,
+)
+from disc_sim_ros.physics.kernels.batch import Ends, fly_rows, fly_simd, workspace
 from disc_sim_ros.physics.kernels.equations import Control, State
 from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, STATE_SIZE, Options
 from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
@@ -29,6 +34,7 @@ from disc_sim_ros.quantities import DURATION, LAUNCH, VARIED
 # A thread takes as many flights at a time as it flies in about 0.1 s, so that Ctrl-C acts soon.
 _ON_GROUND = 1e-8  # m; a landing is located to 1e-9 s
 _CHUNK = 2e6  # steps
+_USUAL_STEP = 5e-3  # s; most steps with error control are longer
 _USUAL_FLIGHT = 10.0  # s; most are shorter
 _LONGEST_CHUNK = 4096  # flights
 _FIRST_GUSTS = 500  # rows of noise drawn at first, for 5 s; most flights have landed by then
@@ -127,14 +133,15 @@ def fly_many(
     )
     gust_seeds = None
     seconds = min(duration, _USUAL_FLIGHT) if ground else duration
-    chunk = round(min(max(_CHUNK * setup.step / seconds, WIDTH), _LONGEST_CHUNK))
+    step = _USUAL_STEP if setup.step is None else setup.step
+    chunk = round(min(max(_CHUNK * step / seconds, WIDTH), _LONGEST_CHUNK))
     if setup.wind.turbulence > 0.0:
         gust_seeds = _seeds(setup.wind.seed if seeds is None else seeds, n)
         chunk = max(chunk // 16, 1)
     common = _Common(setup, control, float(duration), ground, ends)
 
     def work(start: int) -> None:
-        rows, space = _rows(columns, start, min(start + chunk, n)), workspace(setup.plant)
+        rows, space = _rows(columns, start, min(start + chunk, n)), _space(setup)
         if gust_seeds is None:
             common.fly(rows, start, flight.NO_NOISE, common.duration, space)
             return
@@ -159,12 +166,22 @@ def fly_many(
 
 def first_call_note(setup: Setup) -> str:
     """Return one line for users on why the next `fly_many` takes long; '' if it does not."""
-    return note_before(_kernel(gusts=setup.wind.turbulence > 0.0), seconds=15)
+    return note_before(_kernel(setup), seconds=15)
 
 
-def _kernel(*, gusts: bool) -> Callable[..., None]:
+def _kernel(setup: Setup) -> Callable[..., None]:
     """Return the loop over flights: in SIMD registers, but singly in gusts and in plain Python."""
-    return fly_simd if COMPILED and not gusts else fly_rows
+    in_registers = COMPILED and setup.wind.turbulence == 0.0
+    if setup.step is None:
+        return fly_simd_adaptive if in_registers else fly_rows_adaptive
+    return fly_simd if in_registers else fly_rows
+
+
+def _space(setup: Setup) -> Any:
+    """Return a workspace for the loop over flights."""
+    if setup.step is None:
+        return adaptive_workspace(setup.corner_plant)
+    return workspace(setup.plant)
 
 
 @dataclass(frozen=True)
@@ -183,16 +200,18 @@ class _Common:
         start: int,
         noise: FloatArray,
         duration: float,
-        space: Workspace,
+        space: Any,
     ) -> None:
         """Fly all rows, the first of which is flight `start`."""
         setup = self.setup
         inputs = Inputs(self.control, setup.wind_data, noise)
-        options = Options(float(setup.step), duration, self.ground, 0.0)
-        fly = _kernel(gusts=len(noise) > 0)
-        fly(rows, start, setup.plant, inputs, options, self.ends, space)
+        step, plant = setup.fixed_step, setup.plant
+        if setup.step is None:
+            plant = setup.corner_plant
+        options = Options(step, duration, self.ground, 0.0)
+        _kernel(setup)(rows, start, plant, inputs, options, self.ends, space)
 
-    def fly_in_gusts(self, row: FloatArray, i: int, seed: int, space: Workspace) -> None:
+    def fly_in_gusts(self, row: FloatArray, i: int, seed: int, space: Any) -> None:
         """Fly one row; draw more of the same numbers if it is in the air for long."""
         needed = math.ceil(self.duration / GUST_INTERVAL) + 3
         for count in (min(_FIRST_GUSTS, needed), min(4 * _FIRST_GUSTS, needed), needed):
@@ -249,7 +268,7 @@ def _refuse(name: str, values: FloatArray, good: NDArray[np.bool_], allowed: str
 
 def _refuse_long_steps(rows: FloatArray, start: int, setup: Setup) -> None:
     """Refuse a step that RK4 cannot follow in some flight, as `Setup.check_step` does for one."""
-    if setup.model == 'precession':
+    if setup.model == 'precession' or setup.step is None:
         return
     of = {name: rows[:, j] for name, j in AT.items()}
     spin = of['spin']

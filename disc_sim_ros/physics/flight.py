@@ -13,7 +13,7 @@ from disc_sim_ros.errors import ConfigError, IntegrationError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.disc import AERODYNAMICS, GROUND_CONTACTS, Disc
 from disc_sim_ros.physics.environment import Air, Wind
-from disc_sim_ros.physics.kernels import integrator, rotation
+from disc_sim_ros.physics.kernels import adaptive, integrator, rotation
 from disc_sim_ros.physics.kernels.aerodynamics import Linear
 from disc_sim_ros.physics.kernels.equations import (
     BODY,
@@ -55,7 +55,8 @@ class Setup:
         moment_axes: Axes in which moment coefficients act: 'body' (axes 3) or 'wind' (axes 4).
         air: Density and gravity.
         wind: Wind and turbulence.
-        step: Integration step [s].
+        step: Integration step of RK4 [s]; None for error control, which keeps landings within
+            0.01 mm of those of far shorter steps (`kernels.adaptive`).
         ground_contact: What touches the ground: 'centre' (the paper) or 'rim'; None for the
             disc's own.
 
@@ -69,14 +70,15 @@ class Setup:
     moment_axes: str = 'body'
     air: Air = field(default_factory=Air)
     wind: Wind = field(default_factory=Wind)
-    step: float = STEP.default
+    step: float | None = None
     ground_contact: str | None = None
 
     def __post_init__(self) -> None:
         if self.model != SLOWING:
             validation.choice('model', self.model, MODELS)
         validation.choice('moment_axes', self.moment_axes, MOMENT_AXES)
-        STEP.check(self.step)
+        if self.step is not None:
+            STEP.check(self.step)
         if self.ground_contact is not None:
             validation.choice('ground_contact', self.ground_contact, GROUND_CONTACTS)
         if self.aero is not None:
@@ -94,6 +96,16 @@ class Setup:
     def lands_on(self) -> str:
         """Return what touches the ground: 'centre' or 'rim'."""
         return self.ground_contact or self.disc.ground_contact
+
+    @property
+    def fixed_step(self) -> float:
+        """Return the step of a flight in even steps [s]: the given one, or 1 ms."""
+        return float(STEP.default if self.step is None else self.step)
+
+    @cached_property
+    def corner_plant(self) -> Plant:
+        """Return `plant` for flights with error control: see `Disc.corner_rows`."""
+        return self.plant._replace(table=self.disc.corner_rows)
 
     @cached_property
     def plant(self) -> Plant:
@@ -127,8 +139,10 @@ class Setup:
             speed: Speed over the ground [m/s].
 
         Raises:
-            ConfigError: RK4 would be unstable.
+            ConfigError: RK4 would be unstable in steps of the given length.
         """
+        if self.step is None:
+            return
         if self.has_no_nutation:  # p and q follow the moments without delay
             return
         V = speed + math.hypot(*self.wind.mean)
@@ -244,7 +258,8 @@ def fly(
         sample_rate: Samples per second of the trajectory [1/s]; 0 for none.
 
     Returns:
-        The flight; the landing is located to better than 1e-9 s of the RK4 solution.
+        The flight; the landing is located to better than 1e-9 s of the computed solution. Samples
+        are computed as exactly as steps are: each is a shorter step.
 
     Raises:
         ConfigError: A value is out of range, the step is too long for the spin, or the release is
@@ -254,8 +269,14 @@ def fly(
     rows = check_flight(launch, setup, duration, ground=ground, sample_rate=sample_rate)
     samples = np.empty((rows, COLUMNS))
     inputs = Inputs(checked_control(control), setup.wind_data, setup.noise(duration))
-    options = Options(float(setup.step), float(duration), ground, float(sample_rate))
-    result = integrator.integrate(launch.state(), setup.plant, inputs, options, samples)
+    options = Options(setup.fixed_step, float(duration), ground, float(sample_rate))
+    if setup.step is None:
+        space = np.empty(adaptive.SPACE)
+        result = adaptive.integrate_adaptive(
+            launch.state(), setup.corner_plant, inputs, options, samples, space
+        )
+    else:
+        result = integrator.integrate(launch.state(), setup.plant, inputs, options, samples)
     if result.status == integrator.LOST:
         raise lost(result.t, setup.step)
     return Flight(
@@ -290,8 +311,13 @@ def check_flight(
     return rows
 
 
-def lost(t: float, step: float) -> IntegrationError:
+def lost(t: float, step: float | None) -> IntegrationError:
     """Return the error for a flight that the step [s] could not follow at time `t` [s]."""
+    if step is None:
+        return IntegrationError(
+            f'at t = {t:.6g} s the disc turned or moved faster than error control can follow, '
+            f'{STABLE / adaptive.SOUND:,.0f} rad/s; try a given, shorter step'
+        )
     return IntegrationError(
         f'at t = {t:.6g} s the disc turned or moved faster than steps of {step:g} s can follow; '
         'try a shorter step'
@@ -300,7 +326,7 @@ def lost(t: float, step: float) -> IntegrationError:
 
 def first_call_note() -> str:
     """Return one line for users on why the next `fly` takes long; '' if it does not."""
-    return note_before(integrator.integrate, seconds=10)
+    return note_before(adaptive.integrate_adaptive, seconds=10)
 
 
 def _line(disc: Disc) -> Linear:

@@ -78,7 +78,7 @@ class FlightSimulator:
     @property
     def time(self) -> float:
         """Return the time since the release [s]."""
-        return self.steps * self.setup.step
+        return self.steps * self.setup.fixed_step
 
     @property
     def wind(self) -> Velocity:
@@ -143,7 +143,7 @@ class FlightSimulator:
             self._control,
             setup.wind_data,
             self._noise_until(self.steps + steps),
-            float(setup.step),
+            setup.fixed_step,
             self.ground,
             self._landing,
         )
@@ -157,7 +157,7 @@ class FlightSimulator:
         else:
             self._state = State(*self._flight[1 : 1 + STATE_SIZE].tolist())
         if status == LOST:
-            raise lost(t, setup.step)
+            raise lost(t, setup.fixed_step)
         self.steps += steps
 
     def step_arguments(
@@ -170,7 +170,7 @@ class FlightSimulator:
         """
         setup = self.setup
         noise = self._noise_until(self.steps + steps)
-        step = float(setup.step)
+        step = setup.fixed_step
         return (
             self._flight, setup.plant, setup.wind_data, noise, step, self.ground, self._landing
         )  # fmt: skip
@@ -185,7 +185,7 @@ class FlightSimulator:
         """Return the gust noise of all steps up to `step`: the numbers that `fly` draws."""
         if self.setup.wind.turbulence == 0.0:
             return NO_NOISE
-        rows = math.ceil(step * self.setup.step / GUST_INTERVAL) + 3
+        rows = math.ceil(step * self.setup.fixed_step / GUST_INTERVAL) + 3
         while len(self._noise) < rows:
             more = max(_FIRST_GUSTS, len(self._noise))
             noise = self._random.standard_normal((more, NOISE_COLUMNS))

@@ -19,7 +19,7 @@ from disc_sim_ros.quantities import STUDY
 from disc_sim_ros.studies.columns import ADVANCE_RATIO, LAUNCH, quantity
 from disc_sim_ros.studies.flying import kernel_values
 from disc_sim_ros.studies.scatter import Normal, quantiles
-from disc_sim_ros.studies.study import Study, fastest_rate
+from disc_sim_ros.studies.study import Study
 
 RANGE, TIME, ACCURACY = 'range', 'time', 'accuracy'
 GOALS = (RANGE, TIME, ACCURACY)
@@ -83,29 +83,6 @@ class Problem:
     def free(self) -> tuple[str, ...]:
         """Return the names of the free quantities."""
         return tuple(self.limits)
-
-    @property
-    def fastest_spin(self) -> float:
-        """Return the greatest spin within the limits [rad/s]; normal scatter counts to 6 sd."""
-        study = self.study
-        law = study.scatter.get('spin')
-        wide = 6.0 * law.sd if isinstance(law, Normal) else 0.0
-        if ADVANCE_RATIO in self.limits or study.advance_ratio is not None:
-            ratio = max(map(abs, self.limits.get(ADVANCE_RATIO, (study.advance_ratio or 0,))))
-            speed = max(map(abs, self.limits.get('speed', (study.fixed('speed'),))))
-            return 2.0 * speed * ratio / study.setup.disc.diameter
-        return max(map(abs, self.limits.get('spin', (study.fixed('spin'),)))) + wide
-
-    @property
-    def fastest_rate(self) -> float:
-        """Return a bound of the rates within the limits, as `Study.fastest_rate` [1/s]."""
-
-        def largest(name: str) -> float:
-            return max(self.study.largest(name), *map(abs, self.limits.get(name, (0.0,))))
-
-        if self.study.setup.model == 'precession':
-            return 0.0
-        return fastest_rate(self.study.setup, self.fastest_spin, largest, self.study.least)
 
     @property
     def scatters(self) -> bool:

@@ -1,6 +1,6 @@
 """A study: an ensemble of flights, the quantities that differ between them, and their law."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 import math
@@ -221,23 +221,9 @@ class Study:
             return self.largest('spin')
         return theory.spin_rate(ratio, self.setup.disc.diameter, self.largest('speed'))
 
-    @cached_property
-    def fastest_rate(self) -> float:
-        """Return a bound of the rates of nutation, damping and pitching of any flight [1/s].
-
-        It takes the extremes of all that varies together; normal scatter counts to 6 sd.
-        """
-        if self.setup.model == 'precession':  # p and q follow the moments without delay
-            return 0.0
-        return fastest_rate(self.setup, self.fastest_spin, self.largest, self.least)
-
     def largest(self, name: str) -> float:
         """Return the greatest amount of a quantity in any flight; normal scatter to 6 sd."""
         return max(abs(x) for x in self._ends(quantity('name', name)))
-
-    def least(self, name: str) -> float:
-        """Return the least amount of a quantity in any flight, as `largest`."""
-        return min(abs(x) for x in self._ends(quantity('name', name)))
 
     def _check_extremes(self) -> None:
         """Refuse values out of range, and a step that is too long for the fastest spin."""
@@ -273,32 +259,6 @@ class Study:
                 validation.number(f'mean of {q.name}', centre, lowest, highest, unit=q.unit)
                 values += [max(centre - 6 * law.sd, lowest), min(centre + 6 * law.sd, highest)]
         return tuple(values) or (self.fixed(q.name),)
-
-
-def fastest_rate(
-    setup: flight.Setup,
-    spin: float,
-    largest: Callable[[str], float],
-    least: Callable[[str], float],
-) -> float:
-    """Return a bound of the rates of nutation, damping and pitching [1/s].
-
-    Args:
-        setup: The setup with the disc.
-        spin: The greatest spin [rad/s].
-        largest: Returns the greatest amount of a quantity in any flight.
-        least: Returns its least amount.
-    """
-    plant = setup.plant._replace(
-        I_x=least('inertia_diametral'),
-        I_z=largest('inertia_axial'),
-        rho=largest('air_density'),
-        C_Lp=-largest('C_Lp'),
-        C_Mq=-largest('C_Mq'),
-    )
-    airspeed = largest('speed') + math.hypot(*(largest(name) for name in WIND))
-    steepest = setup.disc.steepest_moment(setup.aero or setup.disc.aero)
-    return float(max(flight.rates(spin, airspeed, plant, steepest * largest('pitching_factor'))))
 
 
 def _is_around(law: Normal | Uniform) -> bool:

@@ -59,7 +59,7 @@ def measured(
         zero = np.zeros((1, 2))
         empty = _empty(kind, t, setup.air.gravity)
         times, places = np.unique(empty.sample_times, return_inverse=True)
-        sampled = fly_sampled(state, row, setup, times, step=setup.step, duration=0.0).states
+        sampled = fly_sampled(state, row, setup, times, step=setup.fixed_step, duration=0.0).states
         sampled = sampled[:, places]
         if kind == ATTITUDE:
             made.append(

@@ -61,13 +61,13 @@ def test_the_lowest_point_of_the_rim_is_at_the_ground(launch):
 def test_the_rate_of_the_depth_is_its_finite_difference():
     setup = Setup(disc=DISC)
     sim = FlightSimulator(setup, Launch(height=5.0, roll=30.0, roll_rate=6.0).state())
-    before, dt = None, setup.step
+    before, dt = None, setup.fixed_step
     for _ in range(200):
         sim.advance(1)
         after = sim.state
         if before is not None:
             slope = (rk4.depth(after, RADIUS) - rk4.depth(before, RADIUS)) / dt
-            mean = (rk4._sinking(after, RADIUS) + rk4._sinking(before, RADIUS)) / 2
+            mean = (rk4.sinking(after, RADIUS) + rk4.sinking(before, RADIUS)) / 2
             # The error of the trapezoidal rule: dt^2 / 12 by the third derivative, R w^3 at the
             # nutation of about 65 rad/s with a tilt rate of 6 rad/s.
             assert slope == pytest.approx(mean, abs=dt**2 / 12 * RADIUS * 65**3)

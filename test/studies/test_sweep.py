@@ -27,7 +27,6 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.studies import executors, storage, tables
-from disc_sim_ros.studies.flying import TURN, good_step
 from disc_sim_ros.studies.runner import InterruptedSweepError, collect, sweep
 from disc_sim_ros.studies.scatter import Normal, Uniform
 from disc_sim_ros.studies.study import Study
@@ -112,30 +111,6 @@ def test_the_wind_and_the_disc_can_be_varied():
             wind=Wind(mean=(x, 0.0, 0.0)),
         )
         assert flights['x_m'][i] == pytest.approx(fly(Launch(), setup).position[0], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ('name', 'spin', 'speed'),
-    [
-        ('frisbee', 31.4, 20.0),
-        ('frisbee_as_printed', 31.4, 20.0),
-        ('ultrastar', 60.0, 20.0),
-        ('teebird', 110.0, 25.0),
-        ('wraith', 120.0, 25.0),
-    ],
-)
-def test_the_chosen_step_lands_within_a_millimetre(name, spin, speed):
-    disc = disc_file.load_disc(name)
-    launch = Launch(speed=speed, spin=spin, height=1.5)
-    grid = {'pitch': np.linspace(-5.0, 35.0, 9).tolist(), 'roll': [-25.0, 0.0, 25.0]}
-    step = good_step(Setup(disc=disc), spin)
-    assert step * spin * disc.inertia_axial / disc.inertia_diametral < TURN
-    ends = []
-    for h in (step, 2e-4):
-        study = Study(setup=Setup(disc=disc, step=h), launch=launch, vary=grid)
-        flights = collect(study)
-        ends.append(np.stack([flights['x_m'], flights['y_m']]))
-    assert np.abs(ends[0] - ends[1]).max() < 1e-3
 
 
 # ---- executors ----

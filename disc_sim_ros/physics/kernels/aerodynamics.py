@@ -1,9 +1,9 @@
 """Steady aerodynamic coefficients, eqns 19 to 21 and Fig. 3, as compiled functions."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.kernels.jit import inline
+from disc_sim_ros.physics.kernels.jit import by_type, inline
 from disc_sim_ros.physics.kernels.simd import any_of, at, floor, table_row, where
 
 
@@ -19,6 +19,19 @@ class Linear(NamedTuple):
     CM_alpha: float
 
 
+class Row(NamedTuple):
+    """The line between two rows of a table: see `disc.Disc.table_rows`."""
+
+    alpha: float  # rad, here the line begins
+    C_Lift: float  # there
+    C_Drag: float
+    C_M: float
+    end: float  # rad, here the line ends
+    C_Lift_alpha: float  # slopes [1/rad]
+    C_Drag_alpha: float
+    C_M_alpha: float
+
+
 @inline
 def linear_coefficients(alpha: float, line: Linear) -> tuple[float, float, float]:
     """Return C_Lift, C_Drag and C_M at an angle of attack [rad] by the lines of Fig. 3."""
@@ -31,23 +44,56 @@ def linear_coefficients(alpha: float, line: Linear) -> tuple[float, float, float
 
 
 @inline
+def row_of(table: FloatArray, i: float) -> Row:
+    """Return row `i`, a whole float, of a table."""
+    low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha = table_row(table, i)
+    return Row(low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha)
+
+
+@inline
+def search(alpha: float, table: FloatArray) -> tuple[float, Row]:
+    """Return the number, a whole float, and the row that holds at an angle of attack [rad]."""
+    last = len(table) - 2.0
+    rows_per_rad = (last + 1.0) / (table[len(table) - 1, 0] - table[0, 0])
+    share = (alpha - table[0, 0]) * rows_per_rad
+    i = floor(min(max(0.0, share), last))  # the right row at once if the rows are even
+    row = row_of(table, i)
+    while any_of(((alpha < row.alpha) & (i > 0.0)) | ((alpha >= row.end) & (i < last))):
+        i = where(
+            alpha < row.alpha, max(i - 1.0, 0.0), where(alpha >= row.end, min(i + 1.0, last), i)
+        )
+        row = row_of(table, i)
+    return i, row
+
+
+def _of_row(alpha: float, table: Any) -> Row:
+    return table  # type: ignore[no-any-return]
+
+
+def _of_table(alpha: float, table: Any) -> Row:
+    _, row = search(alpha, table)
+    return row
+
+
+_line_at = by_type(_of_row, _of_table)  # the line of a table at an angle; a Row is its own line
+
+
+@inline
 def table_coefficients(alpha: float, table: FloatArray) -> tuple[float, float, float]:
     """Return C_Lift, C_Drag and C_M at an angle of attack [rad], linear between the rows.
 
     Args:
         alpha: Angle of attack [rad].
-        table: See `disc.Disc.table_rows`. It covers every angle.
+        table: See `disc.Disc.table_rows`. It covers every angle. Or one `Row`, whose line then
+            holds at every angle.
     """
-    last = len(table) - 2.0
-    rows_per_rad = (last + 1.0) / (table[len(table) - 1, 0] - table[0, 0])
-    share = (alpha - table[0, 0]) * rows_per_rad
-    i = floor(min(max(0.0, share), last))  # the right row at once if the rows are even
-    low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha = table_row(table, i)
-    while any_of(((alpha < low) & (i > 0.0)) | ((alpha >= high) & (i < last))):
-        i = where(alpha < low, max(i - 1.0, 0.0), where(alpha >= high, min(i + 1.0, last), i))
-        low, CL, CD, CM, high, CL_alpha, CD_alpha, CM_alpha = table_row(table, i)
-    d_alpha = alpha - low
-    return CL + CL_alpha * d_alpha, CD + CD_alpha * d_alpha, CM + CM_alpha * d_alpha
+    row = _line_at(alpha, table)
+    d_alpha = alpha - row.alpha
+    return (
+        row.C_Lift + row.C_Lift_alpha * d_alpha,
+        row.C_Drag + row.C_Drag_alpha * d_alpha,
+        row.C_M + row.C_M_alpha * d_alpha,
+    )
 
 
 @inline

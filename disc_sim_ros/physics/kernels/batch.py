@@ -23,7 +23,7 @@ from disc_sim_ros.physics.kernels.rows import NAMES, YAW, fill_table, inputs_of,
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
 from disc_sim_ros.physics.kernels.wind import GustFilter
 
-_NO_GUST = Velocity(0.0, 0.0, 0.0)
+NO_GUST = Velocity(0.0, 0.0, 0.0)
 _NO_FILTER = GustFilter(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -101,11 +101,11 @@ def fly_rows(
         fill_table(row, plant.table, table)
         own_plant, own_inputs = plant_of(row, plant, table), inputs_of(row, inputs)
         result = integrate(release(row), own_plant, own_inputs, options, space.no_samples)
-        _write_end(row, result, start + i, ends)
+        write_end(row, result, start + i, ends)
 
 
 @jit
-def _write_end(row: FloatArray, result: IntegrationResult, i: int, ends: Ends) -> None:
+def write_end(row: FloatArray, result: IntegrationResult, i: int, ends: Ends) -> None:
     """Write the end of flight `i`."""
     ends.status[i] = result.status
     ends.time[i] = result.t
@@ -144,9 +144,9 @@ def fly_simd(
                 i = a.flight[lane]
                 fill_table(rows[i], plant.table, table)
                 own_plant, own_inputs = plant_of(rows[i], plant, table), inputs_of(rows[i], inputs)
-                x, apex_Z = _lane(a, lane), a.apex_Z[0, lane]
+                x, apex_Z = flight_in(a, lane), a.apex_Z[0, lane]
                 result = integrate_from(x, apex_Z, own_plant, own_inputs, options, no_samples)
-                _write_end(rows[i], result, start + i, ends)
+                write_end(rows[i], result, start + i, ends)
                 a.active[0, lane] = a.ending[0, lane] = 0.0
                 ended += 1
             if a.active[0, lane] == 0.0 and started < len(rows):
@@ -154,12 +154,12 @@ def fly_simd(
                 fill_table(row, plant.table, table)
                 own_plant, own_inputs = plant_of(row, plant, table), inputs_of(row, inputs)
                 x = initialise(release(row), own_plant, own_inputs)
-                _fill_lane(a, lane, started, row, table, x.state)
+                fill_lane(a, lane, started, row, table, x.state)
                 started += 1
 
         s, k, apex_Zs = load_state(a.state), element(a.steps, 0), element(a.apex_Z, 0)
         plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
-        next_s = rk4_step(s, step, _NO_GUST, _NO_GUST, plants, all_inputs)
+        next_s = rk4_step(s, step, NO_GUST, NO_GUST, plants, all_inputs)
         goes_on = is_sound(next_s, step, plants) & (next_s.Z <= lowest) & (k < whole)  # noqa: SIM300
         if options.ground and plant.rim > 0.0:
             clear = depth(next_s, plant.rim) <= 0.0
@@ -189,7 +189,7 @@ def _whole_steps(step: float, duration: float) -> float:
 
 
 @jit
-def _fill_lane(
+def fill_lane(
     a: LaneState, lane: int, i: int, row: FloatArray, table: FloatArray, s: State
 ) -> None:
     """Start flight `i` in a lane."""
@@ -207,7 +207,7 @@ def _fill_lane(
 
 
 @inline
-def _lane(a: LaneState, lane: int) -> IntegratorState:
+def flight_in(a: LaneState, lane: int) -> IntegratorState:
     """Return the flight in a lane as floats."""
     e = a.state
     s = State(
@@ -227,7 +227,7 @@ def _lane(a: LaneState, lane: int) -> IntegratorState:
         e[13, lane],
     )
     steps = int(a.steps[0, lane])
-    return IntegratorState(steps, s, _NO_GUST, _NO_FILTER, _NO_GUST, _NO_GUST, 0)
+    return IntegratorState(steps, s, NO_GUST, _NO_FILTER, NO_GUST, NO_GUST, 0)
 
 
 @inline

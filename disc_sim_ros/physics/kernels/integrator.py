@@ -80,7 +80,7 @@ def initialise(s: State, plant: Plant, inputs: Inputs) -> IntegratorState:
     if len(noise) > 0:
         filters = first_filter(noise[0])
         gust = gust_of(filters, s.Z, wind)
-        V = _airspeed(s, wind_at(s.Z, gust, wind))
+        V = airspeed(s, wind_at(s.Z, gust, wind))
         filters = next_filter(filters, V, s.Z, GUST_INTERVAL, noise[1])
         end_gust = gust_of(filters, s.Z, wind)
     s = consistent(s, wind_at(s.Z, gust, wind), plant, inputs.control)
@@ -100,7 +100,7 @@ def advance(
         while t / GUST_INTERVAL > i + 1 - 1e-9:  # once, for a step that divides the interval
             i += 1
             start_gust = end_gust
-            V = _airspeed(s, wind_at(s.Z, x.gust, wind))
+            V = airspeed(s, wind_at(s.Z, x.gust, wind))
             filters = next_filter(filters, V, s.Z, GUST_INTERVAL, noise[i + 1])
             end_gust = gust_of(filters, s.Z, wind)
         gust = lerp(start_gust, end_gust, min((t + h) / GUST_INTERVAL - i, 1.0))
@@ -124,7 +124,7 @@ def integrate(
     """
     x = initialise(s, plant, inputs)
     if len(samples) > 0:
-        _write_sample(samples[0], 0.0, x.state, wind_at(s.Z, x.gust, inputs.wind))
+        write_sample(samples[0], 0.0, x.state, wind_at(s.Z, x.gust, inputs.wind))
     return integrate_from(x, s.Z, plant, inputs, options, samples)
 
 
@@ -165,10 +165,10 @@ def integrate_from(
             if d < h * (1.0 - 1e-9):
                 d_gust = lerp(gust, next_gust, d / h)
                 d_s = rk4_step(s, d, gust, d_gust, plant, inputs)
-                _write_sample(samples[written], sample_t, d_s, wind_at(d_s.Z, d_gust, wind))
+                write_sample(samples[written], sample_t, d_s, wind_at(d_s.Z, d_gust, wind))
             else:
                 here = wind_at(next_s.Z, next_gust, wind)
-                _write_sample(samples[written], sample_t, next_s, here)
+                write_sample(samples[written], sample_t, next_s, here)
             written += 1
         if s.VZ < 0.0 <= next_s.VZ:
             apex_Z = min(apex_Z, top(s, next_s, h))
@@ -178,13 +178,15 @@ def integrate_from(
 
 
 @inline
-def _airspeed(s: State, wind: Velocity) -> float:
+def airspeed(s: State, wind: Velocity) -> float:
+    """Return the airspeed of a disc in a wind [m/s]."""
     x, y, z = s.VX - wind.X, s.VY - wind.Y, s.VZ - wind.Z
     return math.sqrt(x * x + y * y + z * z)
 
 
 @inline
-def _write_sample(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
+def write_sample(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
+    """Write t, the state and the wind to a row of the samples."""
     row[0] = t
     for i in range(len(s)):
         row[1 + i] = s[i]

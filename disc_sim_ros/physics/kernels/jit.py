@@ -61,6 +61,27 @@ def inline(function: F) -> F:
     return function
 
 
+def by_type(of_tuple: F, otherwise: F) -> F:
+    """Return a function that is one of two, by the type of its last argument, when it is compiled.
+
+    Args:
+        of_tuple: What it is where that argument is a tuple; plain Python.
+        otherwise: What it is for an array; plain Python, with the same names of arguments.
+    """
+
+    def chosen(*arguments: Any) -> Any:
+        return (of_tuple if isinstance(arguments[-1], tuple) else otherwise)(*arguments)
+
+    if COMPILED:
+        options = {'forceinline': True, **_OPTIONS}
+
+        @numba.extending.overload(chosen, jit_options=options, strict=False)  # type: ignore[untyped-decorator]
+        def choose(*kinds: Any) -> Any:
+            return of_tuple if isinstance(kinds[-1], numba.types.BaseTuple) else otherwise
+
+    return _typed(chosen, of_tuple)
+
+
 def jit(function: F) -> F:
     """Compile a function that compiled functions call."""
     return _typed(numba.njit(**_OPTIONS)(function), function) if COMPILED else function

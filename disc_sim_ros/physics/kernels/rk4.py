@@ -15,6 +15,7 @@ from disc_sim_ros.physics.kernels.equations import (
 )
 from disc_sim_ros.physics.kernels.jit import inline, jit
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
+from disc_sim_ros.physics.kernels.simd import where
 from disc_sim_ros.physics.kernels.wind import WindData, wind_at
 
 STABLE = 2.78  # largest step times rate, of a decay or an oscillation, that stays bounded
@@ -103,14 +104,14 @@ def depth(s: State, rim: float) -> float:
 
 
 @inline
-def _sinking(s: State, rim: float) -> float:
+def sinking(s: State, rim: float) -> float:
     """Return the rate of change of `depth` [m/s]."""
     VZ = s.VZ
     if rim > 0.0:
         _, _, _, _, _, _, zx, zy, zz = rotation_elements(s.e0, s.e1, s.e2, s.e3)
         tilt = math.sqrt(zx * zx + zy * zy)  # its sine
-        if tilt > 0.0:
-            VZ += rim * zz * (zy * s.p - zx * s.q) / tilt
+        level = tilt <= 0.0
+        VZ += where(level, 0.0, rim * zz * (zy * s.p - zx * s.q) / where(level, 1.0, tilt))
     return VZ
 
 
@@ -158,7 +159,7 @@ def touchdown(
     """
     rim = plant.rim if depth(s, plant.rim) <= 0.0 else 0.0
     start_Z, end_Z = depth(s, rim), depth(end, rim)
-    start_V, end_V = _sinking(s, rim), _sinking(end, rim)
+    start_V, end_V = sinking(s, rim), sinking(end, rim)
     a, b = 0.0, h
     if start_Z >= 0.0:
         a = 1e-6 * h
@@ -174,7 +175,7 @@ def touchdown(
         x = next_x if a < next_x < b else 0.5 * (a + b)
         x_gust = lerp(gust, next_gust, x / h)
         x_s = rk4_step(s, x, gust, x_gust, plant, inputs)
-        Z, V = depth(x_s, rim), _sinking(x_s, rim)
+        Z, V = depth(x_s, rim), sinking(x_s, rim)
         next_x = x - Z / V if V != 0.0 else a
         if Z == 0.0 or abs(next_x - x) < _TOLERANCE or b - a < _TOLERANCE:
             break

@@ -38,7 +38,7 @@ def element(row: FloatArray, j: int) -> Any:
 
 
 def store(array: FloatArray, i: int, vector: Any) -> None:
-    """Write a vector to row `i` of an array of shape (n, WIDTH)."""
+    """Write element `i` of an array of shape (n,), or a vector to row `i` of (n, WIDTH)."""
     array[i] = vector
 
 

@@ -308,6 +308,8 @@ def _element(row: Any, j: Any) -> Any:
 
 @overload(simd.store, strict=False)  # type: ignore[untyped-decorator]
 def _store(array: Any, i: Any, vector: Any) -> Any:
+    if array.ndim == 1:
+        return simd.store
     return lambda array, i, vector: store(array, i, vector)  # noqa: PLW0108
 
 

@@ -187,8 +187,8 @@ class CompiledLoop:
                 pacer.epoch,
                 pacer.period,
                 pacer.done,
-                max(1, round(LONGEST_QUANTUM / config.setup.step)),
-                max(1, round(UNWATCHED_QUANTUM / config.setup.step)),
+                max(1, round(LONGEST_QUANTUM / config.setup.fixed_step)),
+                max(1, round(UNWATCHED_QUANTUM / config.setup.fixed_step)),
                 LONGEST_SLEEP,
                 CATCH_UP,
             ),
@@ -225,7 +225,7 @@ class CompiledLoop:
         flight, config = sim.flight_simulator, sim.config
         if flight is None or flight.landed:
             setup = config.setup
-            plant, wind, noise, step = setup.plant, setup.wind_data, NO_NOISE, float(setup.step)
+            plant, wind, noise, step = setup.plant, setup.wind_data, NO_NOISE, setup.fixed_step
             array, ground, landing = self._before, config.ground, self._landing
         else:
             array, plant, wind, noise, step, ground, landing = flight.step_arguments(steps)
@@ -305,7 +305,7 @@ def warm_up() -> None:
     small = np.zeros(1, dtype=np.int32)
     names = np.zeros((1, 1), dtype=np.uint8)
     setup = Setup(disc=disc_file.load_disc('frisbee'))
-    constants = (setup.plant, setup.wind_data, NO_NOISE, setup.step, True)
+    constants = (setup.plant, setup.wind_data, NO_NOISE, setup.fixed_step, True)
     tick.run(
         tick_inbox.Functions(0, 0, 0, 0, 0),
         tick.Outbox(

@@ -126,8 +126,8 @@ def _configuration(v: Mapping[str, Any]) -> SimConfig:
     if v['ground']:
         require_above_ground(launch.height)
     Frames.prefixed(v['frame_prefix'])
-    if 0.0 < v['throw_period'] < setup.step:
-        allowed = f'give 0 or at least one step, {setup.step:g} s'
+    if 0.0 < v['throw_period'] < setup.fixed_step:
+        allowed = f'give 0 or at least one step, {setup.fixed_step:g} s'
         raise ConfigError('throw_period', v['throw_period'], allowed, 'throw_period')
     return SimConfig(
         setup=setup,

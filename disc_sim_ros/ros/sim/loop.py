@@ -70,7 +70,7 @@ class SimLoop(threading.Thread):
             inform: Logs a line that reports no problem.
         """
         super().__init__(name='simulation')
-        self.pacer = Pacer(config.setup.step, max(config.real_time_factor, _SLOWEST), 0.0)
+        self.pacer = Pacer(config.setup.fixed_step, max(config.real_time_factor, _SLOWEST), 0.0)
         self.paused = self.stopped = False
         self._simulation = Simulation(config, publishers, commands, start, warn, inform=inform)
         self._publishers = publishers
@@ -355,7 +355,7 @@ class SimLoop(threading.Thread):
     def _quantum(self, longest: float) -> int:
         """Return how many steps to make until the next poll of the command topics."""
         sim = self._simulation
-        return max(1, min(sim.steps_to_message, round(longest / sim.config.setup.step)))
+        return max(1, min(sim.steps_to_message, round(longest / sim.config.setup.fixed_step)))
 
     def _advance(self, steps: int, *, serve: bool) -> None:
         """Make steps, stopping at each where a command begins or ends or a message is due."""
@@ -391,7 +391,7 @@ class SimLoop(threading.Thread):
     def _restart_pacer(self) -> None:
         config = self._simulation.config
         factor = max(config.real_time_factor, _SLOWEST)
-        self.pacer.restart(config.setup.step, factor, time.monotonic())
+        self.pacer.restart(config.setup.fixed_step, factor, time.monotonic())
 
 
 def _pace(config: SimConfig) -> tuple[float, float, float]:
