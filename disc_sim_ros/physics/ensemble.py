@@ -166,7 +166,7 @@ def fly_many(
 
 def first_call_note(setup: Setup) -> str:
     """Return one line for users on why the next `fly_many` takes long; '' if it does not."""
-    return note_before(_kernel(setup), seconds=15)
+    return note_before(_kernel(setup), seconds=25)
 
 
 def _kernel(setup: Setup) -> Callable[..., None]:

@@ -281,7 +281,8 @@ def comes_down(s: State, end: State, h: float, plant: Plant) -> bool:
     dips = (start_V > 0.0) & (end_V < 0.0) & (start_Z <= 0.0)
     f = where(dips, start_V / where(dips, start_V - end_V, 1.0), 1.0)
     lowest, _, _ = cubic(start_Z, start_V, end_Z, end_V, h, f)
-    return touches(s, end, plant) | (dips & (lowest > 0.0))
+    down: bool = touches(s, end, plant) | (dips & (lowest > 0.0))
+    return down
 
 
 _SAME = 1e-12  # s; a thousandth of the promised 1e-9 s
