@@ -1,4 +1,4 @@
-"""Measure the landing errors of error control and of fixed steps over many different throws of the paper's disc.
+"""Measure the landing errors of error control and fixed steps over many throws of two discs.
 
 The throws are drawn with a fixed seed: 10 to 25 m/s, pitch -5 to 25 degrees, roll within 30
 degrees, spin 20 to 60 rad/s of either sign, with and without a wobble of up to 2 rad/s. The error
