@@ -53,7 +53,8 @@ SHORTEST = 1e-6  # s; taken whatever the error, as at a corner that is not searc
 SOUND = 1e-4  # s; a disc that turns too fast for RK4 steps of this length is lost
 SPACE = SIZE * STAGES  # numbers that the rates of change of one flight take
 _SAFETY = 0.9
-_LEAST, _MOST = 0.2, 5.0  # factors of the length from step to step
+_LEAST = 0.2  # factors of the length from step to step
+_MOST = 5.0
 CLOSE = 1e-9  # s; a step that ends this near to a time ends at it
 
 
