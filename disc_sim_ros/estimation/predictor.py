@@ -234,6 +234,10 @@ class Predictor:
             self._rows = self._rows[first:]
             data = self._measurements()
         fitted = self._estimator.update(data)
+        if early := throw_detection.of_the_hand(data.time, fitted.squares[:, 0]):
+            self._estimator, self._rows = DiscChoice(self._models), self._rows[early:]
+            data = self._measurements()
+            fitted = self._estimator.update(data)
         if _has_ended(fitted, data) and _has_ended(self._estimator.update(data, MORE), data):
             self.reset()
             return None

@@ -11,12 +11,16 @@ LONGEST_WINDOW = 0.55  # ... or, with fewer measurements in it, in which the las
 LEAST = 6  # measurements of a beginning ...
 SHORTEST = 0.05  # ... and their time [s]
 LEAST_SPEED = 4.0  # m/s
-LEAST_HEIGHT = 0.2  # m, of the first measurement; a bounce is lower
+LEAST_HEIGHT = 0.2  # m, that the disc has or will reach; a bounce is lower
 _MOST_OFF = 14.0  # squared residual up to which a point lies on the line
 _SHARE = 0.7  # of the points that must lie on it
+_GRAVITY = 9.81  # m/s^2
 _AERODYNAMIC = 15.0  # m/s^2, usual acceleration of a flight
 _MOST_ACCELERATION = 30.0  # m/s^2, of a flight; a hand has 100
-AFTER_LANDING = 0.15  # s after the predicted landing until the throw has ended
+_MOST_NOISE = 25.0  # m/s^2, of an acceleration that tells a flight from a hand ...
+_LONG = 0.9  # ... in less than this share of WINDOW
+YOUNG = 0.4  # s, in which measurements of the hand are taken out of a throw
+AFTER_LANDING = 0.08  # s after the predicted landing until the throw has ended
 ENDED_BY = 6  # measurements one after the other that the flight cannot explain
 _FAR = 25.0  # their squared residual
 _ONE_STOP = 0.3  # share of the distances that outliers keep from each other: they are one object
@@ -56,7 +60,9 @@ def beginning(time: FloatArray, position: FloatArray, sigma: FloatArray) -> int 
 def _is_flight(t: FloatArray, position: FloatArray, sigma: FloatArray) -> bool:
     """Return True if points lie on a line at constant velocity, but for gravity and air."""
     velocity, start = straight(t, position)
-    if float(np.linalg.norm(velocity)) < LEAST_SPEED or flip(start[2]) < LEAST_HEIGHT:
+    climb = max(float(flip(velocity[2])), 0.0)
+    height = float(flip(start[2])) + climb**2 / (2.0 * _GRAVITY)  # at the top, without air
+    if float(np.linalg.norm(velocity)) < LEAST_SPEED or height < LEAST_HEIGHT:
         return False
     bend = _AERODYNAMIC * t[-1] ** 2 / 16.0  # of a parabola from its chord, half of it
     off = position - start - t[:, None] * velocity
@@ -64,9 +70,25 @@ def _is_flight(t: FloatArray, position: FloatArray, sigma: FloatArray) -> bool:
     fits = squared < _MOST_OFF
     if not fits[0] or float(np.mean(fits)) < _SHARE:
         return False
-    acceleration = 2.0 * np.polynomial.polynomial.polyfit(t[fits], position[fits], 2)[2]
     noise = float(np.median(sigma)) * np.sqrt(720.0 / fits.sum()) / t[-1] ** 2
-    return bool(np.linalg.norm(acceleration) < _MOST_ACCELERATION + 2.0 * noise)
+    if noise > _MOST_NOISE and t[-1] < _LONG * WINDOW:
+        return False  # a hand could look like this
+    acceleration = 2.0 * np.polynomial.polynomial.polyfit(t[fits], position[fits], 2)[2]
+    return bool(np.linalg.norm(acceleration) < _MOST_ACCELERATION + noise)
+
+
+def of_the_hand(time: FloatArray, squares: FloatArray) -> int:
+    """Return how many of the first measurements of a young throw the flight cannot explain.
+
+    Args:
+        time: Times since the reference [s], shape (k,).
+        squares: Squared residuals of the positions, shape (k,).
+    """
+    if time[-1] > YOUNG or float(np.median(squares)) > _MOST_OFF:
+        return 0
+    off = squares > _FAR
+    count = int(np.argmin(off)) if not off.all() else 0
+    return count if len(time) - count >= LEAST else 0
 
 
 def has_ended(now: float, landing_time: float, squares: FloatArray, position: FloatArray) -> bool:

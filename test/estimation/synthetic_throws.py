@@ -27,6 +27,7 @@ class Throw:
     state: np.ndarray  # at the release, paper's axes
     row: np.ndarray  # constants of the flight
     exact: np.ndarray  # positions without noise, in map
+    setup: Setup  # in which it flew
 
     def measurements(self, *, axis: bool = False) -> list[Measurement]:
         return [
@@ -65,6 +66,7 @@ def throw(
         state,
         row,
         map_from_paper(flown.states[0, aloft, :3]),
+        setup,
     )
 
 

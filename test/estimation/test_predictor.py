@@ -9,6 +9,9 @@ from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor
 from disc_sim_ros.estimation.prior import ThrowPrior, disc_offsets
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.physics.launch import Launch
+from disc_sim_ros.physics.sampled import default_row, fly_sampled
 from estimation.synthetic_throws import Throw, throw
 
 SETUP = Setup(disc=load_disc('ultrastar'))
@@ -139,6 +142,45 @@ def test_throw_begins_after_the_hand_and_ends_on_the_ground(throws):
             break
     assert k / 60.0 < 0.2
     assert predictor.throws == 1
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_noisy_hand_is_no_throw(throws, seed):
+    """Of six points in 0.1 s with 2 cm of noise, 100 m/s^2 of a hand look like a flight."""
+    t, rng = throws[seed], np.random.default_rng(seed)
+    velocity = (t.exact[1] - t.exact[0]) * 60.0
+    speed = float(np.linalg.norm(velocity))
+    tau = np.arange(-30, 0) / 60.0
+    before = np.maximum(tau, -speed / 100.0)[:, None]
+    hand = t.exact[0] + velocity * before + 50.0 * velocity / speed * before**2
+    hand += rng.normal(0.0, 0.02, hand.shape)
+    held = [Measurement(float(a), tuple(x)) for a, x in zip(tau, hand, strict=True)]
+    predictor, references = Predictor(CONFIG), []
+    for m in [*held, *t.measurements()]:
+        if m.time > 1.0:
+            break
+        predictor.add(m)
+        if (prediction := predictor.update(ellipse=False)) is not None:
+            references.append((m.time, prediction.reference_time))
+    assert predictor.throws == 1
+    first, _ = references[0]
+    assert -0.04 < first < 0.12
+    assert references[-1][1] > -0.075  # the hand was taken out: its path differs by 0.2 m there
+
+
+def test_throw_from_the_ground_is_recognised_at_once():
+    """It rises so fast that it is no bounce; so its height does not count."""
+    setup, launch = SETUP, Launch(speed=15.0, pitch=15.0, spin=60.0, height=0.0)
+    times = np.arange(0.0, 0.3, 1.0 / 120.0)
+    row = default_row(setup)[None]
+    state = np.array(launch.state())[None]
+    flown = fly_sampled(state, row, setup, times, step=0.002, duration=0.0)
+    predictor = Predictor(CONFIG)
+    for time, at in zip(times, map_from_paper(flown.states[0, :, :3]), strict=True):
+        predictor.add(Measurement(float(time), tuple(at)))
+        if predictor.update(ellipse=False) is not None:
+            break
+    assert time < 0.11
 
 
 @pytest.mark.parametrize('rate', [10.0, 15.0, 24.0])
