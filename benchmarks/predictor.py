@@ -23,7 +23,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.predictor import Predictor, PredictorConfig
-from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets
+from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets, disc_shape
 from disc_sim_ros.estimation.throw_fit import (
     POSITION,
     Estimate,
@@ -118,7 +118,7 @@ def rows(name: str, attitude: bool, seeds: range, times: list[list[float]]) -> N
     if cell.wind_known:
         base = replace(base, wind_x=KNOWN, wind_y=KNOWN)
     offsets = disc_offsets(load_disc(cell.assumed), cell.uncertainty)
-    prior = replace(base, offsets=offsets)
+    prior = replace(base, offsets=offsets, shape=disc_shape(cell.uncertainty))
     drawn = prior if cell.flown == cell.assumed else base
     setup = Setup(disc=load_disc(cell.flown))
     config = PredictorConfig(setup=Setup(disc=load_disc(cell.assumed)), prior=prior)

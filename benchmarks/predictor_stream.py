@@ -43,21 +43,21 @@ def main() -> int:
     setup = Setup(disc=disc)
     predictor = Predictor(PredictorConfig(setup=setup, prior=prior))
     rng = np.random.default_rng(0)
-    begins, ends, misses, begun = [], [], [], time.process_time()
+    begins, ends, misses, began = [], [], [], time.process_time()
     count = round(o.hours * 3600.0 / PERIOD)
     for k in range(count):
         flown = throw(setup, prior, k, rate=RATE, sigma=SIGMA, least=0.9)
-        first, last, miss, found = follow(predictor, flown, k * PERIOD, rng)
+        first, last, miss, number = follow(predictor, flown, k * PERIOD, rng)
         begins.append(first)
         ends.append(last)
-        misses.append(miss if found == 1 else math.nan)
+        misses.append(miss if number == 1 else math.nan)
         if (k + 1) % round(3600.0 / PERIOD) == 0:
             hour = round((k + 1) * PERIOD / 3600.0)
             held = memory()
             print(f'hour {hour}: {predictor.throws} throws, {held:.1f} MB', flush=True)
     print(
         f'{count} throws, {predictor.throws} recognised, {np.isnan(misses).sum()} not once each; '
-        f'{time.process_time() - begun:.0f} s of CPU\n'
+        f'{time.process_time() - began:.0f} s of CPU\n'
         f'begin after the release: {quantiles(begins)}\nend after the landing: {quantiles(ends)}\n'
         f'miss of the last prediction: median {np.nanmedian(misses):.3f} m'
     )

@@ -5,8 +5,8 @@ only a wide range of winds and attitudes fits, across which landings lie on a cu
 drawn and flown; the linear covariance of the landing is too small. Weighting the draws by how well
 they fit made it worse: of some ten unknowns a few draws get all the weight.
 
-An unknown disc is not one offset away from the assumed one at every angle of attack. So the rest
-of a flight has further offsets, drawn anew.
+Another disc is not one offset away from the assumed one at every angle of attack. So the rest of a
+flight may have further offsets, drawn anew (`ThrowPrior.shape`).
 """
 
 from functools import cache
@@ -18,7 +18,6 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.throw_fit import Estimate, Linear, Model, square_root
 
 DRAWS = 64  # throws; a multiple of 16
-REST = 0.5  # of the standard deviations of the disc, for the rest of the flight
 _LEAST_SHARE = 0.5  # of the draws that must land
 _LEAST_VARIANCE = 1e-6  # m^2, of a landing that is shown
 
@@ -54,7 +53,7 @@ def drawn_landings(model: Model, estimate: Estimate, linear: Linear, now: float)
     so_far = tracker.fly(throws.states, throws.rows, np.array([now]), 0.0)
     rows = throws.rows
     places = [model.columns[k] for k in offsets]
-    rows[:, places] += REST * draws[:, m:] * model.sigmas[offsets]
+    rows[:, places] += model.prior.shape * draws[:, m:] * model.sigmas[offsets]
     rest = tracker.fly(so_far.last, rows, np.zeros(1), model.duration)
     landings = rest.landing + np.array([0.0, 0.0, now])
     landed = np.isfinite(landings).all(axis=1)

@@ -5,7 +5,7 @@ import math
 
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.predictor import PredictorConfig
-from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets
+from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets, disc_shape
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
 
@@ -44,4 +44,5 @@ def _prior(setup: Setup, values: Mapping[str, float]) -> ThrowPrior:
         wind_x=Gaussian(float(wind_x), values['wind_sigma']),
         wind_y=Gaussian(float(wind_y), values['wind_sigma']),
         offsets=disc_offsets(setup.disc, values['disc_uncertainty']),
+        shape=disc_shape(values['disc_uncertainty']),
     )

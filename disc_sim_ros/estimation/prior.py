@@ -16,6 +16,7 @@ DISC_OFFSETS = {'lift_offset': 0.02, 'drag_offset': 0.008, 'pitching_offset': 0.
 # The same of the rolling moment, which a file cannot state: at the spin of a throw that due to
 # spin was measured to be up to this size (`ultrastar`), and most discs have no table of it.
 ROLLING_OFFSET = 0.004
+MOST_SHAPE = 0.5  # from factor 2 on
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,8 @@ class ThrowPrior:
         wind_x: Velocity of the air along x of `map` [m/s].
         wind_y: Velocity of the air along y of `map` [m/s].
         offsets: What is added to the coefficients of the disc: columns of an ensemble.
+        shape: Standard deviation of what is added to them for the rest of a flight, as a share of
+            those of the offsets: tables of another disc differ in shape.
     """
 
     speed: Gaussian = Gaussian(17.0, 4.0)
@@ -57,6 +60,7 @@ class ThrowPrior:
     wind_x: Gaussian = Gaussian(0.0, 2.0)
     wind_y: Gaussian = Gaussian(0.0, 2.0)
     offsets: dict[str, Gaussian] = field(default_factory=dict)
+    shape: float = 0.0
 
     @property
     def constants(self) -> dict[str, Gaussian]:
@@ -88,6 +92,11 @@ def manner(states: FloatArray) -> FloatArray:
     out = np.empty((len(states), lanes.MANNER))
     lanes.manners(np.ascontiguousarray(states), out)
     return out
+
+
+def disc_shape(factor: float) -> float:
+    """Return `ThrowPrior.shape` for a factor of the uncertainty: above 1 it is another disc."""
+    return MOST_SHAPE * min(max(factor - 1.0, 0.0), 1.0)
 
 
 def disc_offsets(disc: Disc, factor: float = 1.0) -> dict[str, Gaussian]:
