@@ -24,6 +24,8 @@ TARGETS = {
     'disc_files': 'YAML disc files, loaded and flown 100 steps',
     'ros_messages': 'commands, wind and throws as CDR, accepted and flown 100 steps',
     'configurations': 'recorded configurations, flown again for 0.1 s',
+    'throw_files': 'CSV files of throws and of a TechDisc, flight numbers, read and flown',
+    'tracker_messages': 'measurements of predictor_node as CDR, among those of a throw',
     'mcap_files': 'MCAP files, opened, read, decoded, repaired',
     'flight_bags': 'bags of real flights, damaged, through `analyse_bag --verify`',
 }
@@ -31,7 +33,11 @@ SLOWEST = 20  # s for one input; slower is a hang
 _MEMORY = 2048  # MB
 KERNELS = Path(__file__).parents[2] / 'disc_sim_ros/physics/kernels'
 # What numba compiles; instrumented it would be no longer what flies.
-COMPILED = tuple(f'disc_sim_ros.physics.kernels.{path.stem}' for path in KERNELS.glob('*.py'))
+COMPILED = (
+    *(f'disc_sim_ros.physics.kernels.{path.stem}' for path in KERNELS.glob('*.py')),
+    'disc_sim_ros.physics.sampled',
+    'disc_sim_ros.estimation.lanes',
+)
 INSTRUMENTED = ('disc_sim_ros', 'mcap', 'mcap_ros2')  # and what a target names beside
 MORE_INSTRUMENTED = {'disc_files': ('yaml',)}  # it makes all else ten times slower
 LONGEST = 1 << 20  # bytes of an input

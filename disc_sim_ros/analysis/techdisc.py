@@ -46,6 +46,14 @@ def throws(path: Path | str) -> list[Throw]:
         why = reason(error) if isinstance(error, OSError) else 'it is no text in UTF-8'
         raise ConfigError('techdisc', str(path), f'cannot read it ({why})') from None
     rows = csv.DictReader(text.splitlines())
+    try:
+        return _throws(path, rows)
+    except csv.Error as error:  # such as a cell of more than 131072 characters
+        line = rows.line_num + 1
+        raise ConfigError('techdisc', f'{path} line {line}', str(error)) from None
+
+
+def _throws(path: Path | str, rows: 'csv.DictReader[str]') -> list[Throw]:
     columns = [name.strip() for name in rows.fieldnames or ()]
     rows.fieldnames = columns
     speeds = [name for name in _SPEEDS if name in columns]

@@ -65,12 +65,12 @@ def read(path: Path | str, thing: str = 'THROWS') -> dict[str, Columns]:
         raise ConfigError(thing, f'{name}: {len(lines)} rows', f'at most {_MOST_ROWS} rows')
     if not lines:
         raise ConfigError(thing, name, 'the file is empty')
-    head = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
+    head = _cells(thing, name, *lines[0])
     instruments = _instruments(thing, name, head)
     at = {column: place for place, column in enumerate(head)}
     rows: dict[str, dict[str, list[list[float]]]] = {}
     for number, line in lines[1:]:
-        cells = [cell.strip() for cell in next(csv.reader([line]))]
+        cells = _cells(thing, name, number, line)
         if len(cells) != len(head):
             where = f'{name}: line {number}: {len(cells)} cells'
             raise ConfigError(thing, where, f'the head of the file has {len(head)}')
@@ -121,3 +121,15 @@ def _number(name: str, line: int, column: str, value: str) -> float:
         where = f'{name}: line {line}: {column}'
         raise ConfigError(where, value, 'give a finite number, or nothing')
     return number
+
+
+def _cells(thing: str, name: str, number: int, line: str) -> list[str]:
+    """Return the cells of a line.
+
+    Raises:
+        ConfigError: It is no CSV, such as a cell of more than 131072 characters.
+    """
+    try:
+        return [cell.strip() for cell in next(csv.reader([line]))]
+    except csv.Error as error:
+        raise ConfigError(thing, f'{name}: line {number}', str(error)) from None

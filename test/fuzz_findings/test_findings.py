@@ -12,7 +12,7 @@ from analysis import bags as flight_bags
 
 pytest.importorskip('rclpy')
 
-from disc_sim_ros.analysis import checks, recording, resimulate
+from disc_sim_ros.analysis import checks, recording, resimulate, techdisc
 from disc_sim_ros.analysis.odometry import Motion, motions
 from disc_sim_ros.bags import schemas
 from disc_sim_ros.bags.reader import RawMessage, open_bag
@@ -20,6 +20,7 @@ from disc_sim_ros.bags.topic import Topic
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
+from disc_sim_ros.estimation import replay, throw_csv
 from disc_sim_ros.physics import disc_file
 
 START = 1_700_000_000_000_000_000  # ns
@@ -31,6 +32,19 @@ def test_a_disc_whose_area_is_no_number_is_refused(tmp_path, diameter):
     file.write_text(f'based_on: frisbee\ndiameter_m: {diameter}\n')
     with pytest.raises(ConfigError):
         disc_file.load_disc(str(file))
+
+
+@pytest.mark.parametrize('read', [throw_csv.read, replay.read_csv, techdisc.throws])
+@pytest.mark.parametrize('line', [1, 2])
+def test_a_cell_longer_than_csv_allows_is_refused_with_its_line(tmp_path, read, line):
+    head = 't_s,x_m,y_m,z_m,speedMph,spinRpm,launchAngle,noseAngle,hyzerAngle'
+    lines = [head, '0,0,0,1,60,1000,0,0,0']
+    lines[line - 1] += ',' + '1' * 140_000
+    file = tmp_path / 'throws.csv'
+    file.write_text('\n'.join(lines), encoding='utf-8')
+    with pytest.raises(ConfigError, match=rf'line {line}[^\n]*larger than field limit') as refused:
+        read(file)
+    assert len(str(refused.value)) < 400
 
 
 # The parser of definitions raises something else for each of them.
