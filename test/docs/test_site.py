@@ -15,9 +15,19 @@ pytestmark = pytest.mark.xdist_group('site')  # one build for all
 
 ROOT = Path(__file__).parents[2]
 NO_API = "\nexec(open(r'{}').read())\napidoc_modules = []\n"
-# What takes half the time of the build and gives no warnings of the pages: the theme, and the
-# sources as pages. The site without reference below has the theme.
-PLAIN = "\nhtml_theme = 'basic'\nextensions.remove('sphinx.ext.viewcode')\n"
+# What takes more than half the time of the build and gives no warnings of the pages: the theme,
+# the sources as pages, the index of the search. The site without reference below has all but the
+# sources.
+PLAIN = """
+html_theme = 'basic'
+extensions.remove('sphinx.ext.viewcode')
+smartquotes = False
+import gc, logging
+from sphinx.builders.html import StandaloneHTMLBuilder
+StandaloneHTMLBuilder.search = False
+logging.disable(logging.DEBUG)
+gc.set_threshold(500_000)
+"""
 OUTSIDE = re.compile(
     r'<(?:script|img|iframe|source)[^>]* src(?:set)?="https?:'
     r'|<link[^>]* rel="(?:stylesheet|preload)"[^>]* href="https?:'

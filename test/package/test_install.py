@@ -119,16 +119,21 @@ def check_package_data(site: Path) -> None:
 
 
 @pytest.fixture(scope='module')
-def pip_prefix(tmp_path_factory) -> Path:
+def pip_prefix(tmp_path_factory, wheel) -> Path:
     """Return a fresh virtual environment without ROS; every path has a space in it."""
     folder = tmp_path_factory.mktemp('with pip')
-    source = copy_source(folder / 'a source')
     prefix = folder / 'a prefix'
-    venv.create(prefix, with_pip=True, symlinks=True)
+    venv.create(prefix, symlinks=True)
     # Compiling matplotlib and numba to bytecode would double the time of this test.
-    fast = f'{source}[fast]'  # test_noble.py flies without numba
-    run(prefix / 'bin/python', '-m', 'pip', 'install', '--no-compile', fast, cwd=folder)
+    fast = f'{wheel}[fast]'  # test_noble.py flies without numba
+    run(*pip(prefix), 'install', '--no-compile', fast, cwd=folder)
     return prefix
+
+
+def pip(prefix: Path | str) -> tuple[object, ...]:
+    """Return the command of this environment's pip that acts on another one, which has none."""
+    python = Path(prefix) / 'bin/python'
+    return (sys.executable, '-m', 'pip', '--disable-pip-version-check', '--python', python)
 
 
 @pytest.fixture(scope='module')
@@ -193,7 +198,7 @@ def test_pip_installs_all_files(pip_prefix):
 
 @pytest.mark.packaging
 def test_pip_metadata(pip_prefix):
-    show = run(pip_prefix / 'bin/python', '-m', 'pip', 'show', PACKAGE, cwd=pip_prefix)
+    show = run(*pip(pip_prefix), 'show', PACKAGE, cwd=pip_prefix)
     version = ET.parse(ROOT / 'package.xml').findtext('version')
     assert f'Version: {version}' in show.splitlines()
     assert 'ros-jazzy' not in show

@@ -14,10 +14,10 @@ from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 from package.sources import ROOT
-from package.test_install import copy_source, run
+from package.test_install import pip, run
 
 pytestmark = [
-    pytest.mark.xdist_group('noble'),
+    pytest.mark.xdist_group('install'),  # they share a wheel
     pytest.mark.skipif(
         sys.version_info[:2] != (3, 11) or platform.machine() != 'x86_64',
         reason='PyPI has wheels of these versions for Python 3.11 on x86-64 alone',
@@ -28,20 +28,19 @@ OPTIONAL = ('numba', 'llvmlite', 'pyarrow', 'dask')
 
 
 @pytest.fixture(scope='module')
-def noble(tmp_path_factory) -> Path:
+def noble(tmp_path_factory, wheel) -> Path:
     """Return an environment with exactly the versions of apt, and ROS."""
     pytest.importorskip('rclpy')
     folder = tmp_path_factory.mktemp('noble')
-    source = copy_source(folder / 'source')
     prefix = folder / 'prefix'
-    venv.create(prefix, with_pip=True, symlinks=True)
-    pip = (prefix / 'bin/python', '-m', 'pip', '--disable-pip-version-check', 'install')
-    run(*pip, '--no-compile', '-c', CONSTRAINTS, f'{source}[jazzy]', cwd=folder)
+    venv.create(prefix, symlinks=True)
+    wanted = ('--no-compile', '-c', CONSTRAINTS, f'{wheel}[jazzy]')
+    run(*pip(prefix), 'install', *wanted, cwd=folder)
     return prefix
 
 
 def test_the_versions_are_those_of_apt(noble, tmp_path):
-    frozen = run(noble / 'bin/python', '-m', 'pip', 'freeze', cwd=tmp_path).splitlines()
+    frozen = run(*pip(noble), 'freeze', cwd=tmp_path).splitlines()
     pins = [line for line in CONSTRAINTS.read_text().splitlines() if '==' in line]
     assert pins
     assert set(pins) <= set(frozen)
