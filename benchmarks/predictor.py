@@ -9,7 +9,7 @@ to 2 cm and, where the cell has attitude, the disc's axis to 2 degrees. The boun
 exact model with the same prior, linear at the true throw; `in` is the share of the landings inside
 the predictor's 90 % ellipse.
 A throw counts at a time of watching while it is in the air. Updates come 20 times a
-second, to save time; with one for each measurement the figures were the same.
+second, to save time; of 60 throws with one for each measurement the ratios differed by up to 0.16.
 """
 
 import argparse

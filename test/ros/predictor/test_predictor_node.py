@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.executors import SingleThreadedExecutor
@@ -21,6 +22,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.ros.predictor import outputs
 from disc_sim_ros.ros.predictor.measured import measurement
 from disc_sim_ros.ros.predictor.node import PredictorNode
 from disc_sim_ros.ros.predictor.options import node_config
@@ -30,6 +32,15 @@ from estimation.synthetic_throws import throw
 from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros
+
+KINDS = {
+    'landing': (PoseWithCovarianceStamped, PredictorTopic.LANDING),
+    'path': (Path, PredictorTopic.PATH),
+    'ellipse': (MarkerArray, PredictorTopic.ELLIPSE),
+    'estimate': (Odometry, PredictorTopic.ESTIMATE),
+    'intercept': (PoseStamped, PredictorTopic.INTERCEPT),
+    'weights': (DiagnosticStatus, PredictorTopic.DISC_WEIGHTS),
+}
 
 
 def pose(t: float, position, axis=None) -> PoseStamped:
@@ -56,6 +67,9 @@ def pose(t: float, position, axis=None) -> PoseStamped:
         ('disc', 'frisby', 'frisbee'),
         ('ellipse_rat', 1.0, 'ellipse_rate'),
         ('wind', (1.0, 2.0), '3 numbers'),
+        ('discs', 'ultrastar frisby', 'frisbee'),
+        ('intercept_plane_point', (1.0, 0.0, 0.0), 'intercept_plane_normal'),
+        ('intercept_plane_normal', (math.nan, 0.0, 1.0), 'intercept_plane_normal'),
     ],
 )
 def test_bad_parameters_are_refused(name, value, allowed):
@@ -89,23 +103,52 @@ def test_covariance_gives_the_standard_deviation():
     ).position_sigma == pytest.approx(0.3)
 
 
+def straight_path() -> Path:
+    """Return a path from (0, 0, 2) at 100 s along (10, 0, -1) m/s, with a pose every 0.1 s."""
+    path = Path()
+    path.header.frame_id = 'map'
+    path.poses = [
+        pose(100.0 + 0.1 * k, (1.0 * k, 0.0, 2.0 - 0.1 * k), (0.0, 0.0, 1.0)) for k in range(21)
+    ]
+    return path
+
+
+@pytest.mark.parametrize(
+    ('normal', 'point', 't'),
+    [
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0),  # the height of 1 m, on the way down
+        ((1.0, 0.0, 0.0), (12.5, 7.0, -3.0), 1.25),
+        ((-3.0, 0.0, 0.0), (12.5, 7.0, -3.0), 1.25),  # its length and sense do not matter
+        ((1.0, 0.0, 1.0), (3.0, 0.0, 0.0), 1.0 / 9.0),  # 10 t + 2 - t = 3
+        ((0.0, 0.0, 1.0), (0.0, 0.0, 3.0), None),  # above the path
+    ],
+)
+def test_intercept_is_where_a_straight_path_crosses_the_plane(normal, point, t):
+    config = node_config({'intercept_plane_normal': normal, 'intercept_plane_point': point})
+    crossing = outputs.intercept(straight_path(), config.plane)
+    if t is None:
+        assert crossing is None
+        return
+    at = crossing.pose.position
+    assert (at.x, at.y, at.z) == pytest.approx((10.0 * t, 0.0, 2.0 - t), abs=1e-9)
+    assert stamp(crossing) == pytest.approx(100.0 + t, abs=2e-9)
+    assert crossing.header.frame_id == 'map'
+
+
 def test_node_follows_a_throw(ros_context):
     """A throw with attitudes, with its own stamps; a pose that is not finite between them."""
     flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 4)
-    known = Parameter('disc_uncertainty', value=0.0)
-    node = PredictorNode(context=ros_context, parameter_overrides=[known])
+    chosen = [
+        Parameter('disc_uncertainty', value=0.0),
+        Parameter('discs', value='wraith ultrastar'),
+    ]
+    node = PredictorNode(context=ros_context, parameter_overrides=chosen)
     peer = Node('tracker', context=ros_context, start_parameter_services=False)
     executor = SingleThreadedExecutor(context=ros_context)
     executor.add_node(node)
     executor.add_node(peer)
-    got = {name: [] for name in ('landing', 'path', 'ellipse', 'estimate', 'intercept')}
-    for name, kind, topic in (
-        ('landing', PoseWithCovarianceStamped, PredictorTopic.LANDING),
-        ('path', Path, PredictorTopic.PATH),
-        ('ellipse', MarkerArray, PredictorTopic.ELLIPSE),
-        ('estimate', Odometry, PredictorTopic.ESTIMATE),
-        ('intercept', PoseStamped, PredictorTopic.INTERCEPT),
-    ):
+    got = {name: [] for name in KINDS}
+    for name, (kind, topic) in KINDS.items():
         peer.create_subscription(kind, topic, got[name].append, STATE_QOS)
     publisher = peer.create_publisher(PoseStamped, PredictorTopic.MEASURED_POSE, STATE_QOS)
 
@@ -127,7 +170,7 @@ def test_node_follows_a_throw(ros_context):
             executor.spin_once(0.01)
         end = 100.0 + flown.landing[2]
         spin_until(lambda: got['estimate'] and stamp(got['estimate'][-1]) > end - 0.03)
-        spin_until(lambda: got['path'] and got['intercept'] and got['ellipse'])
+        spin_until(lambda: all(got.values()))
     finally:
         assert node.stop() == ''
         executor.shutdown()
@@ -148,6 +191,9 @@ def test_node_follows_a_throw(ros_context):
     assert times == sorted(times)
     assert path[-1].pose.position.z == pytest.approx(0.0, abs=0.15)  # the rim touches first
     assert got['intercept'][0].pose.position.z == 1.0
+    weights = {value.key: float(value.value) for value in got['weights'][-1].values}
+    assert weights['ultrastar'] > 0.99  # a golf disc falls much sooner
+    assert sum(weights.values()) == pytest.approx(1.0, abs=1e-5)
 
 
 def stamp(message) -> float:
