@@ -91,7 +91,7 @@ def test_a_disc_that_never_clears_the_ground_lands_on_its_centre():
 
 def test_simulator_and_ensemble_land_as_the_flight():
     rolls = np.linspace(-40.0, 40.0, 19)
-    setup = Setup(disc=DISC)
+    setup = Setup(disc=DISC, step=1e-3)
     ends = fly_many({'roll': rolls, 'height': 1.0}, setup)
     for i, roll in enumerate(rolls):
         launch = Launch(roll=float(roll), height=1.0)

@@ -123,8 +123,20 @@ def rate(K: FloatArray, stage: int) -> State:
 def put(K: FloatArray, stage: int, k: State) -> None:
     """Write the rate of change at a stage."""
     i = SIZE * stage
-    for c in range(SIZE):
-        store(K, i + c, k[c])
+    store(K, i, k.X)
+    store(K, i + 1, k.Y)
+    store(K, i + 2, k.Z)
+    store(K, i + 3, k.VX)
+    store(K, i + 4, k.VY)
+    store(K, i + 5, k.VZ)
+    store(K, i + 6, k.e0)
+    store(K, i + 7, k.e1)
+    store(K, i + 8, k.e2)
+    store(K, i + 9, k.e3)
+    store(K, i + 10, k.p)
+    store(K, i + 11, k.q)
+    store(K, i + 12, k.r)
+    store(K, i + 13, k.sigma)
 
 
 @inline
