@@ -52,10 +52,16 @@ def errors(problem: Problem, x: FloatArray, best: Best, progress: Progress | Non
         return Errors(x, _scaled(known.covariance(), stretches), known.widening, stretches)
     place = problem.free.index(marginal.DAMPING)
     held = marginal.holding(problem, integrated.mean)
-    known = information.information(held, np.delete(integrated.x, place))
-    within = np.insert(np.insert(known.covariance(), place, 0.0, axis=0), place, 0.0, axis=1)
-    ones = np.ones(len(problem.free))
-    return Errors(integrated.x, within + integrated.between, known.widening, ones)
+    rest, stretches = _profiled(held, np.delete(integrated.x, place), Best(), progress)
+    known = information.information(held, rest)
+    within = _scaled(known.covariance(), stretches)
+    covariance = np.insert(np.insert(within, place, 0.0, axis=0), place, 0.0, axis=1)
+    return Errors(
+        np.insert(rest, place, integrated.mean),
+        covariance + integrated.between,
+        known.widening,
+        np.insert(stretches, place, 1.0),
+    )
 
 
 def _scaled(covariance: FloatArray, stretches: FloatArray) -> FloatArray:
