@@ -211,7 +211,9 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
     ]
     lines.append(f'  estimated wind {last.wind[0]:.1f}, {last.wind[1]:.1f} m/s')
     if len(discs) > 1:
-        likely = sorted(zip(discs, last.weights, strict=True), key=lambda pair: -pair[1])
+        likely = sorted(
+            zip(discs, last.weights, strict=True), key=lambda pair: pair[1], reverse=True
+        )
         lines.append('  disc: ' + ', '.join(f'{name} {100 * w:.1f} %' for name, w in likely))
     return '\n'.join(lines)
 

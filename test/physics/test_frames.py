@@ -206,8 +206,13 @@ EXCEPTIONS = {
     ('paper/crosscheck.py', '-launch.height'): 'the same',
     ('envs/steering.py', '0.0 - z'): 'from the disc to a target on the ground, a difference',
     ('estimation/lift_coordinates.py', '-y'): 'a vector at right angles, no turn',
+    ('estimation/lanes.py', '-y'): 'the same, compiled',
+    ('estimation/lanes.py', '-Z'): 'the climb of a velocity, an angle about no axis of a frame',
+    (
+        'estimation/lanes.py',
+        '-math.asin(min(max((b * X - a * Y) / level, -1.0), 1.0))',
+    ): 'the bank of an axis about its path, in one system',
     ('estimation/local.py', '-Y'): 'the shortest rotation of one vector to another',
-    ('estimation/prior.py', '-forward[:, 1]'): 'a vector at right angles, no turn',
     (
         'estimation/throw_fit.py',
         '-s.VY',

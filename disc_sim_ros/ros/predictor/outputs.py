@@ -97,7 +97,7 @@ def intercept(m: Path, plane: Plane) -> PoseStamped | None:
 
 def disc_weights(throw: int, weights: Mapping[str, float]) -> DiagnosticStatus:
     """Return how likely each disc is, the most likely first."""
-    likely = sorted(weights.items(), key=lambda item: -item[1])
+    likely = sorted(weights.items(), key=lambda item: item[1], reverse=True)
     return DiagnosticStatus(
         level=DiagnosticStatus.OK,
         name=f'throw {throw}',
