@@ -94,7 +94,7 @@ def test_it_throws_records_verifies_and_reports(tmp_path, capsys):
     assert analyse_bag.main([str(bag), '--json', '--verify']) == 0
     document = json.loads(capsys.readouterr().out)
     (flight,) = document['discs'][0]['flights']
-    assert fly.main([*flags, '--json']) == 0
+    assert fly.main([*flags, '--step', '0.001', '--json']) == 0
     flown = json.loads(capsys.readouterr().out)
     assert flight['landing_position_m'] == flown['landing_position_m']
     assert flight['flight_time_s'] == flown['flight_time_s']

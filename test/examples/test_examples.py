@@ -31,7 +31,7 @@ from disc_sim_ros.ros.processes import started
 pytestmark = pytest.mark.ros
 
 EXAMPLES = Path(__file__).parents[2] / 'examples'
-FRISBEE = Setup(disc=disc_file.load_disc('frisbee'))
+FRISBEE = Setup(disc=disc_file.load_disc('frisbee'), step=1e-3)  # that of sim_node
 WAITING = {'auto_throw': False, 'real_time_factor': 4.0}
 DEADLINE = 180.0  # s; an idle machine needs 20
 

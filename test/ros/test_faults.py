@@ -46,7 +46,7 @@ pytestmark = pytest.mark.ros
 HIGH = {'launch.height': 5.0, 'auto_throw': False, 'publish_rate': 200.0, 'start_time': 0.0}
 PERIOD = 5_000_000  # ns
 HOUR = 3600
-SETUP = Setup(disc=disc_file.load_disc('frisbee'))
+SETUP = Setup(disc=disc_file.load_disc('frisbee'), step=1e-3)  # that of sim_node
 LAUNCH = Launch(height=5.0)
 EXPECTED = fly(LAUNCH, SETUP)
 NUMBERS = 7 + 36 + 6 + 36  # what a serialised Odometry ends with, covariances after each part

@@ -148,7 +148,7 @@ def _fields(message):
 def test_the_spiral_turn_is_that_of_fly(ros, capsys):
     """The paper's Fig. 11: renewed commands for 18 s, down from 50 m."""
     arguments = '--roll -45 --pitch -30 --alpha 5 --speed 13.5 --advance-ratio 0.5 --height 50'
-    control = '--control 0.1 0 0 --samples 50 --json'
+    control = '--control 0.1 0 0 --samples 50 --step 0.001 --json'
     assert fly_command.main([*arguments.split(), *control.split()]) == 0
     flown = json.loads(capsys.readouterr().out)
     launch = flown['launch']
