@@ -2,6 +2,7 @@
 
 import math
 import re
+import sys
 import time
 
 import numpy as np
@@ -372,12 +373,18 @@ def test_the_clock_is_published_at_its_own_rate(ros):
         clocks[name] = ros.subscribe(Clock, f'{name}_clock', raw=True)
     ros.pause(ros.sims[-1])
     ros.spin_until(lambda: all(clocks.values()), 'the clocks')
-    ros.forget()
-    begin = time.monotonic()
-    ros.spin_until(wall(1.5))
-    duration = time.monotonic() - begin
-    rates = {name: len(ticks) / duration for name, ticks in clocks.items()}
-    assert all(40 < rate < 215 for rate in rates.values()), rates
-    for name, ticks in clocks.items():
-        stamps = [ns(cdr) for cdr in ticks]
-        assert (len(set(stamps)) == 1) if name == 'usual' else (min(np.diff(stamps)) > 0)
+    measured = []
+    for _ in range(6):  # a machine under load holds messages back, or delivers many at once
+        ros.forget()
+        begin = time.monotonic()
+        ros.spin_until(wall(1.5))
+        duration = time.monotonic() - begin
+        for name, ticks in clocks.items():
+            stamps = [ns(cdr) for cdr in ticks]
+            assert (len(set(stamps)) == 1) if name == 'usual' else all(np.diff(stamps) > 0)
+        measured.append({name: len(ticks) / duration for name, ticks in clocks.items()})
+        if all(40 < rate < 215 for rate in measured[-1].values()):
+            break
+        sys.stderr.write(f'measured again, because the rates were {measured[-1]}\n')
+    else:
+        pytest.fail(f'no 1.5 s with 40 to 215 messages a second: {measured}')
