@@ -69,7 +69,7 @@ class ForeignNames(SphinxPostTransform):
     """Makes names in signatures that no object of this package has plain text, such as `float`.
 
     Sphinx would do the same after it had compared each with the names of all objects, which took
-    most of the time of writing.
+    half of the time of writing.
     """
 
     default_priority = ReferencesResolver.default_priority - 1

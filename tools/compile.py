@@ -1,6 +1,8 @@
 """Compile the equations of motion into the cache, so that parallel tests need not."""
 
 from concurrent.futures import ProcessPoolExecutor, wait
+from dataclasses import replace
+import importlib.util
 import multiprocessing
 
 import numpy as np
@@ -14,14 +16,24 @@ SETUP = flight.Setup(disc=disc_file.load_disc('frisbee'))
 
 
 def compile_single_flights() -> None:
-    """Compile the functions of `flight.fly` and of the simulator."""
+    """Compile the functions of `flight.fly`, with and without a given step."""
     flight.fly(Launch(), SETUP, duration=0.01, ground=False)
+    flight.fly(Launch(), replace(SETUP, step=1e-3), duration=0.01, ground=False)
+
+
+def compile_the_simulator() -> None:
+    """Compile the simulator, and where there is ROS the loop of `sim_node`."""
     simulator.warm_up()
+    if importlib.util.find_spec('rclpy'):
+        from disc_sim_ros.ros.sim import compiled_loop  # noqa: PLC0415 - it needs ROS
+
+        compiled_loop.warm_up()
 
 
 def compile_ensembles() -> None:
-    """Compile the loop over many flights."""
+    """Compile the loops over many flights."""
     fly_many({}, SETUP, duration=0.01, ground=False)
+    fly_many({}, replace(SETUP, step=0.02), duration=0.01, ground=False)
 
 
 def compile_sampled_flights() -> None:
@@ -36,6 +48,7 @@ if __name__ == '__main__':
         for future in wait(
             [
                 pool.submit(compile_single_flights),
+                pool.submit(compile_the_simulator),
                 pool.submit(compile_ensembles),
                 pool.submit(compile_sampled_flights),
             ]
