@@ -98,7 +98,7 @@ def test_drag_alone_slows_a_straight_flight_as_one_over_t():
     """Without gravity dV/dt = -k V^2: V = V_0 / (1 + k V_0 t), x = ln(1 + k V_0 t) / k."""
     disc = drag_only(FRISBEE, 0.5)
     air = Air(gravity=0.0)
-    t = free(Launch(speed=20.0, pitch=0.0), Setup(disc=disc, air=air), 4.0)
+    t = free(Launch(speed=20.0, pitch=0.0), Setup(disc=disc, air=air, step=1e-3), 4.0)
     k = 0.5 * 1.225 * disc.area * 0.5 / disc.mass
     assert_allclose(t.velocity[:, 0], 20.0 / (1 + k * 20.0 * t.t), rtol=1e-11)
     assert_allclose(t.position[:, 0], np.log1p(k * 20.0 * t.t) / k, atol=1e-9)
