@@ -138,7 +138,7 @@ def test_it_agrees_with_fly(document, capsys, tmp_path):
     flags = text.split()
     assert fly.main([*flags, '--bag', str(tmp_path / 'bag')]) == 0
     assert re.search(r'  wrote   \S+/bag: \d+ messages of \d+ topics', capsys.readouterr().out)
-    assert fly.main([*flags, '--json']) == 0
+    assert fly.main([*flags, '--step', '0.001', '--json']) == 0
     flown = json.loads(capsys.readouterr().out)
     code, summary = document(tmp_path / 'bag', '--verify')
     assert code == 0

@@ -24,7 +24,7 @@ GUSTY = Wind(mean=(1.0, 2.0, 0.0), turbulence=10.0, seed=5)
     ('model', 'wind', 'chunk'), list(itertools.product(MODELS, (Wind(), GUSTY), (1, 7, 10_000)))
 )
 def test_any_number_of_steps_at_a_time_gives_the_same_flight(model, wind, chunk):
-    setup = Setup(disc=FRISBEE, model=model, wind=wind)
+    setup = Setup(disc=FRISBEE, model=model, wind=wind, step=1e-3)
     control = Control(C_L=0.01)
     whole = fly(LAUNCH, setup, control=control, sample_rate=1000.0)
     sim = FlightSimulator(setup, LAUNCH.state())
@@ -46,7 +46,7 @@ def test_any_number_of_steps_at_a_time_gives_the_same_flight(model, wind, chunk)
 def test_a_tilted_release_is_completed_once(roll, pitch, yaw):
     """A second normalisation would change the last bit of these quaternions."""
     launch = Launch(roll=roll, pitch=pitch, yaw=yaw, height=5.0)
-    setup = Setup(disc=FRISBEE)
+    setup = Setup(disc=FRISBEE, step=1e-3)
     sim = FlightSimulator(setup, launch.state())
     while not sim.landed:
         sim.advance(50)

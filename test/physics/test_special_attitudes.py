@@ -34,7 +34,7 @@ def drag_at(degrees):
 
 
 def free(launch, duration=4.0, *, setup=None, rate=200.0):
-    setup = setup or Setup(disc=FRISBEE)
+    setup = setup or Setup(disc=FRISBEE, step=1e-3)
     return fly(launch, setup, duration=duration, ground=False, sample_rate=rate).trajectory
 
 
@@ -43,7 +43,7 @@ def free(launch, duration=4.0, *, setup=None, rate=200.0):
 @pytest.mark.parametrize('spin', [0.0, 31.416, -31.416])
 def test_release_at_rest_falls_flat_at_terminal_velocity(model, axes, roll, spin):
     """Flat fall: V = V_t tanh(g t / V_t) with the drag of +90 or, upside down, -90 degrees."""
-    setup = Setup(disc=FRISBEE, model=model, moment_axes=axes)
+    setup = Setup(disc=FRISBEE, model=model, moment_axes=axes, step=1e-3)
     t = free(Launch(speed=0.0, pitch=0.0, roll=roll, spin=spin), setup=setup)
     V_t = math.sqrt(2 * WEIGHT / (RHO * FRISBEE.area * drag_at(90.0 if roll == 0.0 else -90.0)))
     assert_allclose(t.velocity[:, 2], V_t * np.tanh(G * t.t / V_t), atol=1e-9)
@@ -99,7 +99,7 @@ def test_vertical_launch_at_zero_angle_of_attack(pitch, sign):
 def test_flat_side_first(alpha, pitch):
     """The disc only slows down, dV/dt = -k V^2, on a straight line."""
     launch = Launch(speed=15.0, pitch=pitch, angle_of_attack=alpha)
-    setup = Setup(disc=FRISBEE, air=Air(gravity=0.0))
+    setup = Setup(disc=FRISBEE, air=Air(gravity=0.0), step=1e-3)
     t = free(launch, 2.0, setup=setup)
     k = 0.5 * RHO * FRISBEE.area * drag_at(alpha) / FRISBEE.mass
     along = np.array(launch.state()[3:6]) / 15.0
@@ -113,7 +113,7 @@ def test_flat_side_first(alpha, pitch):
 @pytest.mark.parametrize('model', MODELS)
 def test_every_corner_is_finite_and_bounded(disc, model):
     """Airspeed is bounded by the energy of the launch; the attitude remains a rotation."""
-    setup = Setup(disc=disc_file.load_disc(disc), model=model)
+    setup = Setup(disc=disc_file.load_disc(disc), model=model, step=1e-3)
     for speed, pitch, roll, alpha, spin, axes in itertools.product(
         (0.0, 25.0), (-90.0, 0.0, 90.0), (0.0, 180.0), (-90.0, 0.0, 90.0, 180.0),
         (0.0, -40.0), MOMENT_AXES,
