@@ -78,6 +78,7 @@ WHY = {
     'ruff': 'linter and formatter',
     'scipy': 'fits, optimisation and integration in analyses',
     'Sphinx': 'builds the documentation site',
+    'soupsieve': 'of furo; version 3 refuses Python 3.11.0 to 3.11.4, as of Debian 12',
     'stable-baselines3': 'trains the policy of `examples/train_steer.py`',
     'torch': 'as stable-baselines3; flying the policy does not need it',
     'trimesh': 'the viewer of pages with flights, with three.js in it',

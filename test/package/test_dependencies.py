@@ -6,6 +6,7 @@ from pathlib import Path
 import re
 
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 import pytest
 
@@ -89,6 +90,21 @@ def test_the_lock_file_pins_all_dependencies_of_its_packages():
                 pin = LOCKED[canonicalize_name(inner.name)]
                 assert inner.specifier.contains(pin, prereleases=True), (name, line)
         checked += 1
+    assert checked > 50
+
+
+def test_the_lock_file_suits_the_oldest_python():
+    """Debian 12 has Python 3.11.2, and pip refuses the whole file for one package."""
+    checked = 0
+    for name, version in LOCKED.items():
+        try:
+            distribution = metadata.distribution(name)
+        except metadata.PackageNotFoundError:
+            continue
+        if distribution.version == version:
+            needed = distribution.metadata['Requires-Python'] or ''
+            assert SpecifierSet(needed).contains('3.11.0'), (name, version, needed)
+            checked += 1
     assert checked > 50
 
 
