@@ -11,10 +11,11 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup
 from disc_sim_ros.physics.kernels import step_batch
-from disc_sim_ros.physics.kernels.integrator import LANDED, LOST, STATE_SIZE
+from disc_sim_ros.physics.kernels.integrator import LANDED, LOST
 from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
 from disc_sim_ros.physics.kernels.rk4 import Inputs
 from disc_sim_ros.physics.kernels.simd import WIDTH
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import CONTROL, LAUNCH, MEAN_WIND
 from disc_sim_ros.validation import Quantity

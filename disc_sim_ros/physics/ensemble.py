@@ -22,11 +22,12 @@ from disc_sim_ros.physics.kernels.adaptive_batch import (
 )
 from disc_sim_ros.physics.kernels.batch import Ends, fly_rows, fly_simd, workspace
 from disc_sim_ros.physics.kernels.equations import Control, State
-from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, STATE_SIZE, Options
+from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, Options
 from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
 from disc_sim_ros.physics.kernels.rk4 import STABLE, Inputs
 from disc_sim_ros.physics.kernels.rows import AT, NAMES
 from disc_sim_ros.physics.kernels.simd import WIDTH
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS
 from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import DURATION, LAUNCH, VARIED

@@ -12,7 +12,6 @@ from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.ensemble import defaults
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.equations import Control
-from disc_sim_ros.physics.kernels.integrator import STATE_SIZE
 from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
 from disc_sim_ros.physics.kernels.rk4 import STABLE, Inputs
 from disc_sim_ros.physics.kernels.rows import NAMES
@@ -24,6 +23,7 @@ from disc_sim_ros.physics.kernels.sampling import (
     sample_space,
 )
 from disc_sim_ros.physics.kernels.simd import WIDTH
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 
 _FLIGHTS_A_THREAD = 64  # fewer are not worth a second thread
 

@@ -18,10 +18,10 @@ from disc_sim_ros.physics.kernels.integrator import (
     INTEGRATOR_STATE_SIZE,
     LANDED,
     LOST,
-    STATE_SIZE,
     Observation,
 )
 from disc_sim_ros.physics.kernels.jit import note_before
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS, WindData, wind_at
 from disc_sim_ros.physics.launch import Launch, require_above_ground
 

@@ -7,12 +7,13 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.kernels.integrator import LANDED, STATE_SIZE
+from disc_sim_ros.physics.kernels.integrator import LANDED
 from disc_sim_ros.physics.kernels.jit import COMPILED
 from disc_sim_ros.physics.kernels.rk4 import Inputs
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
 from disc_sim_ros.physics.kernels.sampling import Grid, Samples, sample_space
 from disc_sim_ros.physics.kernels.simd import WIDTH
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.kernels.tracking import SEEN, Sight, track_simd
 from disc_sim_ros.physics.sampled import fly_sampled
 

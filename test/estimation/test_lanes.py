@@ -8,8 +8,8 @@ from disc_sim_ros.estimation.prior import ThrowPrior
 from disc_sim_ros.estimation.throw_fit import Estimate, Model
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.kernels.integrator import STATE_SIZE
 from disc_sim_ros.physics.kernels.rows import AT
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.sampled import default_row, fly_sampled
 

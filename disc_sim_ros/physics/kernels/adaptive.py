@@ -11,7 +11,7 @@ from typing import NamedTuple
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.physics.kernels import dopri5
 from disc_sim_ros.physics.kernels.aerodynamics import Row, row_of, search
-from disc_sim_ros.physics.kernels.dopri5 import SIZE, STAGES, with_table
+from disc_sim_ros.physics.kernels.dopri5 import STAGES, with_table
 from disc_sim_ros.physics.kernels.equations import Plant, State, Velocity, flow
 from disc_sim_ros.physics.kernels.integrator import (
     FLYING,
@@ -36,6 +36,7 @@ from disc_sim_ros.physics.kernels.rk4 import (
     touches,
 )
 from disc_sim_ros.physics.kernels.simd import where
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.kernels.wind import (
     GUST_INTERVAL,
     gust_of,
@@ -51,7 +52,7 @@ LONGEST_IN_SPIN_TABLE = (
 )
 SHORTEST = 1e-6  # s; taken whatever the error, as at a corner that is not searched for
 SOUND = 1e-4  # s; a disc that turns too fast for RK4 steps of this length is lost
-SPACE = SIZE * STAGES  # numbers that the rates of change of one flight take
+SPACE = STATE_SIZE * STAGES  # numbers that the rates of change of one flight take
 _SAFETY = 0.9
 _LEAST = 0.2  # factors of the length from step to step
 _MOST = 5.0

@@ -25,18 +25,17 @@ from disc_sim_ros.physics.kernels.batch import (
     Workspace,
     fill_lane,
     flight_in,
-    load_state,
-    select,
     workspace,
     write_end,
 )
-from disc_sim_ros.physics.kernels.dopri5 import SIZE, STAGES, with_table
+from disc_sim_ros.physics.kernels.dopri5 import STAGES, with_table
 from disc_sim_ros.physics.kernels.equations import Plant
 from disc_sim_ros.physics.kernels.integrator import Options, initialise
 from disc_sim_ros.physics.kernels.jit import entry, inline
 from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, top
 from disc_sim_ros.physics.kernels.rows import fill_table, inputs_of, plant_of, release
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
+from disc_sim_ros.physics.kernels.state_arrays import load_state, select, store_state
 
 
 class AdaptiveWorkspace(NamedTuple):
@@ -104,8 +103,7 @@ def fly_simd_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
                 fill_table(rows[i], plant.table, table)
                 own_plant, own_inputs = plant_of(rows[i], plant, table), inputs_of(rows[i], inputs)
                 x, apex_Z = flight_in(a, lane), a.apex_Z[0, lane]
-                for j in range(SIZE):
-                    K[j] = lanes_K[j, lane]
+                dopri5.put(K, 0, dopri5.rate(lanes_K[:, lane], 0))
                 result = continue_adaptive(
                     x, _progress(space, lane), apex_Z, own_plant, own_inputs, options,
                     no_samples, K,
@@ -122,13 +120,12 @@ def fly_simd_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
                 own_plant = with_table(own_plant, row_of(table, p.row))
                 dopri5.start(x.state, NO_GUST, own_plant, own_inputs, K)
                 fill_lane(a, lane, started, row, table, x.state)
-                for j in range(SIZE):
-                    lanes_K[j, lane] = K[j]
+                dopri5.put(lanes_K[:, lane], 0, dopri5.rate(K, 0))
                 for j in range(len(p)):
                     space.progress[j, lane] = p[j]
                 started += 1
 
-        s, apex_Zs = load_state(a.state), element(a.apex_Z, 0)
+        s, apex_Zs = load_state(a.state, 0), element(a.apex_Z, 0)
         p = Progress(
             element(space.progress, 0),
             element(space.progress, 1),
@@ -162,10 +159,9 @@ def fly_simd_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
             apex_Zs = where(over_the_top, min(apex_Zs, top(s, next_s, p.h)), apex_Zs)
         store(a.apex_Z, 0, where(accepted, min(apex_Zs, next_s.Z), apex_Zs))
         next_s = select(accepted, next_s, s)
-        for j in range(SIZE):
-            store(a.state, j, next_s[j])
-            last = element(lanes_K, SIZE * (STAGES - 1) + j)
-            store(lanes_K, j, where(accepted, last, element(lanes_K, j)))
+        store_state(a.state, 0, next_s)
+        last = dopri5.rate(lanes_K, STAGES - 1)
+        dopri5.put(lanes_K, 0, select(accepted, last, dopri5.rate(lanes_K, 0)))
         for j in range(len(next_p)):
             store(space.progress, j, where(alone > 0.0, p[j], next_p[j]))
 

@@ -1,14 +1,13 @@
 """The loops over many flights: one after the other, or `simd.WIDTH` at a time."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.physics.kernels.equations import Plant, State, Velocity
 from disc_sim_ros.physics.kernels.integrator import (
-    STATE_SIZE,
     IntegrationResult,
     IntegratorState,
     Options,
@@ -21,6 +20,12 @@ from disc_sim_ros.physics.kernels.rk4 import Inputs, depth, is_sound, rk4_step, 
 from disc_sim_ros.physics.kernels.rotation import cos_sin_degrees
 from disc_sim_ros.physics.kernels.rows import NAMES, YAW, fill_table, inputs_of, plant_of, release
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
+from disc_sim_ros.physics.kernels.state_arrays import (
+    STATE_SIZE,
+    load_state,
+    select,
+    store_state,
+)
 from disc_sim_ros.physics.kernels.wind import GustFilter
 
 NO_GUST = Velocity(0.0, 0.0, 0.0)
@@ -112,8 +117,7 @@ def write_end(row: FloatArray, result: IntegrationResult, i: int, ends: Ends) ->
     ends.apex[i] = 0.0 - result.apex_Z
     c_yaw, s_yaw = cos_sin_degrees(row[YAW])
     ends.drift[i] = s_yaw * result.state.X - c_yaw * result.state.Y
-    for k in range(STATE_SIZE):
-        ends.states[i, k] = result.state[k]
+    store_state(ends.states[i], 0, result.state)
 
 
 @entry
@@ -157,7 +161,7 @@ def fly_simd(
                 fill_lane(a, lane, started, row, table, x.state)
                 started += 1
 
-        s, k, apex_Zs = load_state(a.state), element(a.steps, 0), element(a.apex_Z, 0)
+        s, k, apex_Zs = load_state(a.state, 0), element(a.steps, 0), element(a.apex_Z, 0)
         plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
         next_s = rk4_step(s, step, NO_GUST, NO_GUST, plants, all_inputs)
         goes_on = is_sound(next_s, step, plants) & (next_s.Z <= lowest) & (k < whole)  # noqa: SIM300
@@ -175,8 +179,7 @@ def fly_simd(
             apex_Zs = where(over_the_top, min(apex_Zs, top(s, next_s, step)), apex_Zs)
         store(a.apex_Z, 0, min(apex_Zs, next_s.Z))
         store(a.steps, 0, where(goes_on, k + 1.0, k))
-        for j in range(STATE_SIZE):
-            store(a.state, j, next_s[j])
+        store_state(a.state, 0, next_s)
 
 
 @jit
@@ -199,8 +202,7 @@ def fill_lane(
     for j in range(len(table)):
         for k in range(8):
             a.table[j, 8 * lane + k] = table[j, k]
-    for k in range(STATE_SIZE):
-        a.state[k, lane] = s[k]
+    store_state(a.state[:, lane], 0, s)
     a.apex_Z[0, lane] = s.Z
     a.steps[0, lane] = 0.0
     a.active[0, lane] = 1.0
@@ -209,64 +211,6 @@ def fill_lane(
 @inline
 def flight_in(a: LaneState, lane: int) -> IntegratorState:
     """Return the flight in a lane as floats."""
-    e = a.state
-    s = State(
-        e[0, lane],
-        e[1, lane],
-        e[2, lane],
-        e[3, lane],
-        e[4, lane],
-        e[5, lane],
-        e[6, lane],
-        e[7, lane],
-        e[8, lane],
-        e[9, lane],
-        e[10, lane],
-        e[11, lane],
-        e[12, lane],
-        e[13, lane],
-    )
+    s = load_state(a.state[:, lane], 0)
     steps = int(a.steps[0, lane])
     return IntegratorState(steps, s, NO_GUST, _NO_FILTER, NO_GUST, NO_GUST, 0)
-
-
-@inline
-def load_state(a: FloatArray) -> State:
-    """Return the states in all lanes, shape (14, WIDTH), as vectors."""
-    return State(
-        element(a, 0),
-        element(a, 1),
-        element(a, 2),
-        element(a, 3),
-        element(a, 4),
-        element(a, 5),
-        element(a, 6),
-        element(a, 7),
-        element(a, 8),
-        element(a, 9),
-        element(a, 10),
-        element(a, 11),
-        element(a, 12),
-        element(a, 13),
-    )
-
-
-@inline
-def select(condition: Any, a: State, b: State) -> State:
-    """Return the state `a` in the lanes where the condition holds, else `b`."""
-    return State(
-        where(condition, a.X, b.X),
-        where(condition, a.Y, b.Y),
-        where(condition, a.Z, b.Z),
-        where(condition, a.VX, b.VX),
-        where(condition, a.VY, b.VY),
-        where(condition, a.VZ, b.VZ),
-        where(condition, a.e0, b.e0),
-        where(condition, a.e1, b.e1),
-        where(condition, a.e2, b.e2),
-        where(condition, a.e3, b.e3),
-        where(condition, a.p, b.p),
-        where(condition, a.q, b.q),
-        where(condition, a.r, b.r),
-        where(condition, a.sigma, b.sigma),
-    )

@@ -29,10 +29,10 @@ from disc_sim_ros.physics.kernels.equations import (
 )
 from disc_sim_ros.physics.kernels.jit import inline, jit
 from disc_sim_ros.physics.kernels.rk4 import Inputs, axpy, lerp
-from disc_sim_ros.physics.kernels.simd import any_of, element, store, where
+from disc_sim_ros.physics.kernels.simd import any_of, where
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE, load_state, store_state
 from disc_sim_ros.physics.kernels.wind import wind_at
 
-SIZE = len(State._fields)
 STAGES = 7
 
 # Row i: the weights of stages 0 to i - 1 for the state at stage i; row 6 is the result.
@@ -100,43 +100,13 @@ def start(s: State, gust: Velocity, plant: Plant, inputs: Inputs, K: FloatArray)
 @inline
 def rate(K: FloatArray, stage: int) -> State:
     """Return the rate of change at a stage."""
-    i = SIZE * stage
-    return State(
-        element(K, i),
-        element(K, i + 1),
-        element(K, i + 2),
-        element(K, i + 3),
-        element(K, i + 4),
-        element(K, i + 5),
-        element(K, i + 6),
-        element(K, i + 7),
-        element(K, i + 8),
-        element(K, i + 9),
-        element(K, i + 10),
-        element(K, i + 11),
-        element(K, i + 12),
-        element(K, i + 13),
-    )
+    return load_state(K, STATE_SIZE * stage)
 
 
 @inline
 def put(K: FloatArray, stage: int, k: State) -> None:
     """Write the rate of change at a stage."""
-    i = SIZE * stage
-    store(K, i, k.X)
-    store(K, i + 1, k.Y)
-    store(K, i + 2, k.Z)
-    store(K, i + 3, k.VX)
-    store(K, i + 4, k.VY)
-    store(K, i + 5, k.VZ)
-    store(K, i + 6, k.e0)
-    store(K, i + 7, k.e1)
-    store(K, i + 8, k.e2)
-    store(K, i + 9, k.e3)
-    store(K, i + 10, k.p)
-    store(K, i + 11, k.q)
-    store(K, i + 12, k.r)
-    store(K, i + 13, k.sigma)
+    store_state(K, STATE_SIZE * stage, k)
 
 
 @inline

@@ -26,6 +26,7 @@ from disc_sim_ros.physics.kernels.rk4 import (
     touchdown,
     touches,
 )
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE, load_state, store_state
 from disc_sim_ros.physics.kernels.wind import (
     GUST_INTERVAL,
     GustFilter,
@@ -37,7 +38,6 @@ from disc_sim_ros.physics.kernels.wind import (
 )
 
 FLYING, LANDED, LOST = range(3)  # LOST: beyond the numbers or the rates that a step can follow
-STATE_SIZE = len(State._fields)
 
 
 class Options(NamedTuple):
@@ -188,8 +188,7 @@ def airspeed(s: State, wind: Velocity) -> float:
 def write_sample(row: FloatArray, t: float, s: State, wind: Velocity) -> None:
     """Write t, the state and the wind to a row of the samples."""
     row[0] = t
-    for i in range(len(s)):
-        row[1 + i] = s[i]
+    store_state(row, 1, s)
     row[-3] = wind.X
     row[-2] = wind.Y
     row[-1] = wind.Z
@@ -246,8 +245,7 @@ def advance_steps(
             break
         if ground and touches(x.state, after.state, plant):
             h, _, s = touchdown(x.state, step, after.state, x.gust, after.gust, plant, inputs)
-            for i in range(STATE_SIZE):
-                landing[i] = s[i]
+            store_state(landing, 0, s)
             status = LANDED
             t = x.steps * step + h
             break
@@ -258,9 +256,7 @@ def advance_steps(
 
 @inline
 def _unpacked(a: FloatArray) -> IntegratorState:
-    s = State(
-        a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13], a[14]
-    )
+    s = load_state(a, 1)
     gust = Velocity(a[15], a[16], a[17])
     filters = GustFilter(a[18], a[19], a[20], a[21], a[22])
     start_gust, end_gust = Velocity(a[23], a[24], a[25]), Velocity(a[26], a[27], a[28])
@@ -270,8 +266,7 @@ def _unpacked(a: FloatArray) -> IntegratorState:
 @inline
 def _pack(x: IntegratorState, a: FloatArray) -> None:
     a[0] = x.steps
-    for i in range(STATE_SIZE):
-        a[1 + i] = x.state[i]
+    store_state(a, 1, x.state)
     for i in range(3):
         a[15 + i] = x.gust[i]
         a[23 + i] = x.start_gust[i]

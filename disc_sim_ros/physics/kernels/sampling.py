@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray, IntArray
-from disc_sim_ros.physics.kernels.batch import load_state, select
 from disc_sim_ros.physics.kernels.equations import (
     Plant,
     State,
@@ -14,7 +13,7 @@ from disc_sim_ros.physics.kernels.equations import (
     consistent,
     derivative,
 )
-from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, LOST, STATE_SIZE, initialise
+from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, LOST, initialise
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
 from disc_sim_ros.physics.kernels.rk4 import (
     Inputs,
@@ -26,6 +25,12 @@ from disc_sim_ros.physics.kernels.rk4 import (
 )
 from disc_sim_ros.physics.kernels.rows import NAMES, fill_table, inputs_of, plant_of
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
+from disc_sim_ros.physics.kernels.state_arrays import (
+    STATE_SIZE,
+    load_state,
+    select,
+    store_state,
+)
 from disc_sim_ros.physics.kernels.wind import wind_at
 
 NO_GUST = Velocity(0.0, 0.0, 0.0)
@@ -102,7 +107,7 @@ def sample_rows(
         fill_table(rows[i], plant.table, space.own_table)
         own_plant = plant_of(rows[i], plant, space.own_table)
         own_inputs = inputs_of(rows[i], inputs)
-        s = initialise(_state(states[i]), own_plant, own_inputs).state
+        s = initialise(load_state(states[i], 0), own_plant, own_inputs).state
         out.status[i] = FLYING
         j = k = 0
         while j < len(times) or (out.status[i] == FLYING and k * step < grid.duration):
@@ -118,8 +123,9 @@ def sample_rows(
                 )
                 while j < len(times) and times[j] < t + step:
                     x = between(s, d, next_s, next_d, step, times[j] - t, own_plant, own_inputs)
-                    for c in range(STATE_SIZE):
-                        out.states[i, j, c] = x[c] if sound else math.nan
+                    if not sound:
+                        x = axpy(x, math.nan, x)
+                    store_state(out.states[i, j], 0, x)
                     j += 1
             if out.status[i] == FLYING and (not sound or touches(s, next_s, own_plant)):
                 _write_end(i, s, next_s, t, step, sound, own_plant, own_inputs, out)
@@ -146,7 +152,7 @@ def sample_simd(
         for lane in range(WIDTH):
             fill_lane(a, lane, first + min(lane, count - 1), states, rows, plant, inputs, out)
         plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
-        s = load_state(a.state)
+        s = load_state(a.state, 0)
         j = k = 0
         flying = WIDTH
         while j < len(times) or (flying > 0 and k * step < grid.duration):
@@ -173,17 +179,12 @@ def sample_simd(
             how = how * element(a.flags, 0)
             if any_of(how > 0.0):
                 store(a.flags, 1, how)
-                for c in range(STATE_SIZE):
-                    store(a.state, c, s[c])
-                    store(a.next_state, c, next_s[c])
+                store_state(a.state, 0, s)
+                store_state(a.next_state, 0, next_s)
                 flying -= end_lanes(a, first, count, t, step, rows, plant, inputs, out)
             s = next_s
             k += 1
-        for c in range(STATE_SIZE):
-            store(a.state, c, s[c])
-        for lane in range(count):
-            if out.status[first + lane] == FLYING:
-                write_state(first + lane, k * step, lane_state(a.state, lane), out)
+        write_flying(a, s, first, count, k * step, out)
 
 
 @jit
@@ -200,14 +201,15 @@ def fill_lane(
     """Start flight `i` in a lane."""
     row, table = rows[i], a.own_table
     fill_table(row, plant.table, table)
-    s = initialise(_state(states[i]), plant_of(row, plant, table), inputs_of(row, inputs)).state
+    s = initialise(
+        load_state(states[i], 0), plant_of(row, plant, table), inputs_of(row, inputs)
+    ).state
     for j in range(len(row)):
         a.row[j, lane] = row[j]
     for j in range(len(table)):
         for k in range(8):
             a.table[j, 8 * lane + k] = table[j, k]
-    for k in range(STATE_SIZE):
-        a.state[k, lane] = s[k]
+    store_state(a.state[:, lane], 0, s)
     a.flags[0, lane] = 1.0
     out.status[i] = FLYING
 
@@ -235,7 +237,7 @@ def end_lanes(
                 fill_table(rows[i], plant.table, a.own_table)
                 own_plant = plant_of(rows[i], plant, a.own_table)
                 own_inputs = inputs_of(rows[i], inputs)
-                s, next_s = lane_state(a.state, lane), lane_state(a.next_state, lane)
+                s, next_s = load_state(a.state[:, lane], 0), load_state(a.next_state[:, lane], 0)
                 sound = a.flags[1, lane] < 2.0
                 _write_end(i, s, next_s, t, step, sound, own_plant, own_inputs, out)
     return ended
@@ -261,11 +263,7 @@ def _write_samples(
     d, next_d = rate_of_change(s, plants, inputs), rate_of_change(next_s, plants, inputs)
     while j < len(times) and times[j] < t + step:
         x = between(s, d, next_s, next_d, step, times[j] - t, plants, inputs)
-        for c in range(STATE_SIZE):
-            store(buffer, c, where(sound, x[c], math.nan))
-        for lane in range(count):
-            for c in range(STATE_SIZE):
-                out.states[first + lane, j, c] = buffer[c, lane]
+        write_lanes(x, sound, count, buffer, out.states[first:, j])
         j += 1
     return j
 
@@ -316,18 +314,29 @@ def _write_end(
 def write_state(i: int, t: float, s: State, out: Samples) -> None:
     """Write the end of flight `i`."""
     out.time[i] = t
-    for c in range(STATE_SIZE):
-        out.ends[i, c] = s[c]
+    store_state(out.ends[i], 0, s)
 
 
 @inline
-def _state(e: FloatArray) -> State:
-    return State(
-        e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8], e[9], e[10], e[11], e[12], e[13]
-    )
+def write_flying(a: SampleSpace, s: State, first: int, count: int, t: float, out: Samples) -> None:
+    """Write the states in the lanes as the ends of the flights that have not ended."""
+    store_state(a.state, 0, s)
+    for lane in range(count):
+        if out.status[first + lane] == FLYING:
+            write_state(first + lane, t, load_state(a.state[:, lane], 0), out)
 
 
 @inline
-def lane_state(a: FloatArray, lane: int) -> State:
-    """Return the state in a column."""
-    return _state(a[:, lane])
+def write_lanes(s: State, sound: Any, count: int, buffer: FloatArray, states: FloatArray) -> None:
+    """Write the states in the first lanes to rows; nan where not sound.
+
+    Args:
+        s: A state in each lane.
+        sound: Condition in each lane.
+        count: Number of lanes.
+        buffer: Shape (14, WIDTH), overwritten.
+        states: Filled, shape (at least count, 14).
+    """
+    store_state(buffer, 0, select(sound, s, axpy(s, math.nan, s)))
+    for lane in range(count):
+        store_state(states[lane], 0, load_state(buffer[:, lane], 0))

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray, IntArray
-from disc_sim_ros.physics.kernels.batch import load_state, select
 from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity, consistent
-from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, LOST, STATE_SIZE
+from disc_sim_ros.physics.kernels.integrator import FLYING, LANDED, LOST
 from disc_sim_ros.physics.kernels.jit import entry, inline
 from disc_sim_ros.physics.kernels.rk4 import (
     Inputs,
@@ -24,6 +23,7 @@ from disc_sim_ros.physics.kernels.rk4 import (
 )
 from disc_sim_ros.physics.kernels.rows import release
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE, load_state, select, store_state
 from disc_sim_ros.physics.kernels.wind import WindData, wind_at
 
 _NO_GUST = Velocity(0.0, 0.0, 0.0)
@@ -91,13 +91,11 @@ def release_batch(
         for i in range(3):
             batch.control[b, i, lane] = 0.0
             batch.wind[b, i, lane] = winds[k, i]
-        s = _state_of_lane(states, k) if len(states) > 0 else release(launches[k])
-        for i in range(STATE_SIZE):
-            batch.release[b, i, lane] = s[i]
+        s = load_state(states[:, k], 0) if len(states) > 0 else release(launches[k])
+        store_state(batch.release[b, :, lane], 0, s)
         own = _inputs_of_lane(batch, b, lane, inputs)
         s = consistent(s, wind_at(s.Z, _NO_GUST, own.wind), plant, own.control)
-        for i in range(STATE_SIZE):
-            batch.state[b, i, lane] = s[i]
+        store_state(batch.state[b, :, lane], 0, s)
         batch.steps[b, 0, lane] = 0.0
         batch.active[b, 0, lane] = 1.0
         batch.status[b, lane] = FLYING
@@ -134,12 +132,12 @@ def advance_batch(
     lowest = 0.0 if ground else math.inf  # Z down
     rim = plant.rim
     for b in range(start, stop):
-        s, done = load_state(batch.state[b]), element(batch.steps[b], 0)
+        s, done = load_state(batch.state[b], 0), element(batch.steps[b], 0)
         active = element(batch.active[b], 0)
         own = _inputs_of_block(batch, b, inputs)
         new = done <= 0.0
         if any_of(new):  # as `integrator.initialise`, with the control inputs of the first step
-            first = load_state(batch.release[b])
+            first = load_state(batch.release[b], 0)
             wind = wind_at(first.Z, _NO_GUST, own.wind)
             s = select(new, consistent(first, wind, lanes_plant, own.control), s)
         for _ in range(steps):
@@ -151,9 +149,8 @@ def advance_batch(
             if any_of(ending > 0.0):
                 store(batch.ending[b], 0, ending)
                 store(batch.steps[b], 0, done)
-                for i in range(STATE_SIZE):
-                    store(batch.state[b], i, s[i])
-                    store(batch.beyond[b], i, next_s[i])
+                store_state(batch.state[b], 0, s)
+                store_state(batch.beyond[b], 0, next_s)
                 for lane in range(WIDTH):
                     if batch.ending[b, 0, lane] > 0.0:
                         _end(batch, b, lane, plant, inputs, step)
@@ -165,8 +162,7 @@ def advance_batch(
             done = where(goes_on, done + 1.0, done)
         store(batch.steps[b], 0, done)
         store(batch.active[b], 0, active)
-        for i in range(STATE_SIZE):
-            store(batch.state[b], i, s[i])
+        store_state(batch.state[b], 0, s)
 
 
 @entry
@@ -190,9 +186,9 @@ def advance_singly(
             if batch.active[b, 0, lane] == 0.0:
                 continue
             own = _inputs_of_lane(batch, b, lane, inputs)
-            s, done = _state_of_lane(batch.state[b], lane), batch.steps[b, 0, lane]
+            s, done = load_state(batch.state[b, :, lane], 0), batch.steps[b, 0, lane]
             if done == 0.0:
-                s = _state_of_lane(batch.release[b], lane)
+                s = load_state(batch.release[b, :, lane], 0)
                 s = consistent(s, wind_at(s.Z, _NO_GUST, own.wind), plant, own.control)
             next_s = s
             for _ in range(steps):
@@ -204,9 +200,8 @@ def advance_singly(
                 s = next_s
                 done += 1.0
             batch.steps[b, 0, lane] = done
-            for i in range(STATE_SIZE):
-                batch.state[b, i, lane] = s[i]
-                batch.beyond[b, i, lane] = next_s[i]
+            store_state(batch.state[b, :, lane], 0, s)
+            store_state(batch.beyond[b, :, lane], 0, next_s)
             if batch.active[b, 0, lane] == 0.0:
                 _end(batch, b, lane, plant, inputs, step)
 
@@ -214,7 +209,8 @@ def advance_singly(
 @inline
 def _end(batch: Batch, b: int, lane: int, plant: Plant, inputs: Inputs, step: float) -> None:
     """Write how a flight ends in the step from `state` to `beyond`."""
-    s, beyond = _state_of_lane(batch.state[b], lane), _state_of_lane(batch.beyond[b], lane)
+    s = load_state(batch.state[b, :, lane], 0)
+    beyond = load_state(batch.beyond[b, :, lane], 0)
     t = batch.steps[b, 0, lane] * step
     status = LOST
     if is_sound(beyond, step, plant):
@@ -222,8 +218,7 @@ def _end(batch: Batch, b: int, lane: int, plant: Plant, inputs: Inputs, step: fl
         h, _, s = touchdown(s, step, beyond, _NO_GUST, _NO_GUST, plant, own)
         t += h
         status = LANDED
-    for i in range(STATE_SIZE):
-        batch.end[b, i, lane] = s[i]
+    store_state(batch.end[b, :, lane], 0, s)
     batch.end_time[b, lane] = t
     batch.status[b, lane] = status
 
@@ -246,27 +241,6 @@ def _inputs_of_lane(batch: Batch, b: int, lane: int, inputs: Inputs) -> Inputs:
     X, Y, Z = v[b, 0, lane], v[b, 1, lane], v[b, 2, lane]
     wind = WindData(X, Y, Z, w.z0, w.per_log, w.W_20, w.x_X, w.x_Y)
     return Inputs(control, wind, inputs.noise)
-
-
-@inline
-def _state_of_lane(a: FloatArray, lane: int) -> State:
-    """Return the state in a lane, or in a column of shape (14, m), as floats."""
-    return State(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-        a[9, lane],
-        a[10, lane],
-        a[11, lane],
-        a[12, lane],
-        a[13, lane],
-    )
 
 
 def lanes_table(table: FloatArray) -> FloatArray:

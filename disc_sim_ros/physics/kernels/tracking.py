@@ -8,9 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.kernels.batch import load_state, select
 from disc_sim_ros.physics.kernels.equations import Plant, State
-from disc_sim_ros.physics.kernels.integrator import FLYING, STATE_SIZE
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
 from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, rk4_step, touches
 from disc_sim_ros.physics.kernels.rotation import rotation_elements
@@ -23,11 +21,12 @@ from disc_sim_ros.physics.kernels.sampling import (
     between,
     end_lanes,
     fill_lane,
-    lane_state,
     rate_of_change,
-    write_state,
+    write_flying,
+    write_lanes,
 )
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
+from disc_sim_ros.physics.kernels.state_arrays import load_state, select, store_state
 
 SEEN = 6  # X, Y, Z and the axis through the underside in earth axes 1
 
@@ -85,7 +84,7 @@ def _track_group(
     """Fly the flights in the lanes, `count` of them from `first` on."""
     plants, all_inputs = plant_of(a.row, plant, a.table), inputs_of(a.row, inputs)
     step, times = grid.step, grid.times
-    s = load_state(a.state)
+    s = load_state(a.state, 0)
     d = rate_of_change(s, plants, all_inputs)
     place = first // WIDTH * len(times) * SEEN
     j = k = 0
@@ -103,27 +102,18 @@ def _track_group(
                 j += 1
             if j == len(times):
                 x = between(s, d, next_s, next_d, step, times[j - 1] - t, plants, all_inputs)
-                for c in range(STATE_SIZE):
-                    store(a.next_state, c, where(sound, x[c], math.nan))
-                for lane in range(count):
-                    for c in range(STATE_SIZE):
-                        sight.last[first + lane, c] = a.next_state[c, lane]
+                write_lanes(x, sound, count, a.next_state, sight.last[first:])
             d = next_d
         how = where(sound, where(touches(s, next_s, plants), 1.0, 0.0), 2.0)
         how = how * element(a.flags, 0)
         if any_of(how > 0.0):
             store(a.flags, 1, how)
-            for c in range(STATE_SIZE):
-                store(a.state, c, s[c])
-                store(a.next_state, c, next_s[c])
+            store_state(a.state, 0, s)
+            store_state(a.next_state, 0, next_s)
             flying -= end_lanes(a, first, count, t, step, rows, plant, inputs, out)
         s = next_s
         k += 1
-    for c in range(STATE_SIZE):
-        store(a.state, c, s[c])
-    for lane in range(count):
-        if out.status[first + lane] == FLYING:
-            write_state(first + lane, k * step, lane_state(a.state, lane), out)
+    write_flying(a, s, first, count, k * step, out)
 
 
 @inline

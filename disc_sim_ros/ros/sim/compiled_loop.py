@@ -15,7 +15,8 @@ from disc_sim_ros.physics import disc_file, simulator
 from disc_sim_ros.physics.flight import NO_NOISE, Setup
 from disc_sim_ros.physics.kernels import jit
 from disc_sim_ros.physics.kernels.equations import Control, Velocity
-from disc_sim_ros.physics.kernels.integrator import INTEGRATOR_STATE_SIZE, STATE_SIZE
+from disc_sim_ros.physics.kernels.integrator import INTEGRATOR_STATE_SIZE
+from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.simulator import NOTHING
 from disc_sim_ros.quantities import CONTROL, CONTROL_MOMENT
 from disc_sim_ros.ros.cdr_template import CdrTemplate
