@@ -7,6 +7,7 @@ import multiprocessing
 
 import numpy as np
 
+from disc_sim_ros.estimation.predictor import Predictor, PredictorConfig
 from disc_sim_ros.physics import disc_file, flight, simulator
 from disc_sim_ros.physics.ensemble import fly_many
 from disc_sim_ros.physics.launch import Launch
@@ -36,11 +37,12 @@ def compile_ensembles() -> None:
     fly_many({}, replace(SETUP, step=0.02), duration=0.01, ground=False)
 
 
-def compile_sampled_flights() -> None:
-    """Compile the loop of the estimators."""
+def compile_the_estimators() -> None:
+    """Compile what predictions and fits fly and compare."""
     states = np.array(Launch().state())[np.newaxis]
     rows = default_row(SETUP)[np.newaxis]
     fly_sampled(states, rows, SETUP, np.zeros(1), step=0.01, duration=0.01)
+    Predictor(PredictorConfig(setup=SETUP)).warm_up()
 
 
 if __name__ == '__main__':
@@ -50,7 +52,7 @@ if __name__ == '__main__':
                 pool.submit(compile_single_flights),
                 pool.submit(compile_the_simulator),
                 pool.submit(compile_ensembles),
-                pool.submit(compile_sampled_flights),
+                pool.submit(compile_the_estimators),
             ]
         ).done:
             future.result()
