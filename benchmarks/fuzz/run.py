@@ -27,6 +27,7 @@ TARGETS = {
     'throw_files': 'CSV files of throws and of a TechDisc, flight numbers, read and flown',
     'tracker_messages': 'measurements of predictor_node as CDR, among those of a throw',
     'mcap_files': 'MCAP files, opened, read, decoded, repaired',
+    'bag_metadata': 'metadata.yaml and such records, of a bag that is read and repaired',
     'flight_bags': 'bags of real flights, damaged, through `analyse_bag --verify`',
 }
 SLOWEST = 20  # s for one input; slower is a hang

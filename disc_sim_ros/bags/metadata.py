@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from disc_sim_ros.bags.topic import LOADER, Topic, qos_profiles, qos_yaml
+from disc_sim_ros.bags.topic import LOADER, MALFORMED, Topic, qos_profiles, qos_yaml
 from disc_sim_ros.errors import BagError
 
 FILE_NAME = 'metadata.yaml'
@@ -106,7 +106,7 @@ def parse(text: str) -> BagMetadata:
             compression_mode=str(root.get('compression_mode') or ''),
             message_count=int(root['message_count']),
         )
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except MALFORMED as error:
         reason = ' '.join(str(error).split())
         raise BagError(f'no metadata of rosbag2 ({type(error).__name__}: {reason})') from None
 

@@ -94,7 +94,7 @@ def type_hash(type_name: str) -> str | None:
         try:
             hashes = json.loads(path.read_text(encoding='utf-8'))['type_hashes'] if path else ()
             return next(str(h['hash_string']) for h in hashes if h['type_name'] == type_name)
-        except (ValueError, KeyError, TypeError, StopIteration):
+        except (OSError, ValueError, KeyError, TypeError, StopIteration):
             continue
     return None
 

@@ -11,6 +11,16 @@ from disc_sim_ros.units import NANOSECONDS
 
 # The C one is many times faster; not every build of PyYAML has it.
 LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+# What reading a YAML document of somebody else raises; int(inf) is an OverflowError.
+MALFORMED = (
+    yaml.YAMLError,
+    KeyError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+)
 INFINITE = 9223372036854775807  # ns: 9223372036 s and 854775807 ns, rmw's RMW_DURATION_INFINITE
 _FOXY_INFINITE = ((2147483647, 4294967295), (2147483647, 2147483647))  # sec, nsec in old bags
 
@@ -107,7 +117,7 @@ def parse_qos(text: str) -> tuple[Qos, ...]:
     """
     try:
         return qos_profiles(yaml.load(text, Loader=LOADER) or [])  # noqa: S506 - a safe one
-    except yaml.YAMLError as error:
+    except MALFORMED as error:
         raise BagError(f'QoS is no YAML ({" ".join(str(error).split())})') from None
 
 
@@ -151,7 +161,7 @@ def _profile(item: Any) -> Qos:
             avoid_ros_namespace_conventions=bool(item['avoid_ros_namespace_conventions']),
             **{name: _word(item[name], words) for name, words in _WORDS.items()},
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except MALFORMED as error:
         raise BagError(f'a QoS profile lacks or misstates {error}') from None
 
 

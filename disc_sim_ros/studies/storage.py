@@ -134,13 +134,18 @@ class Parts:
     def _manifest(self) -> dict[str, Any] | None:
         path = self.folder / _MANIFEST
         try:
-            manifest: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+            manifest: Any = json.loads(path.read_text(encoding='utf-8'))
         except FileNotFoundError:
             return None
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             allowed = f'cannot read {path} ({error}); --force starts again'
             raise ConfigError('output', str(self.output), allowed) from None
-        return manifest
+        if isinstance(manifest, dict):
+            batch = manifest.get('batch')
+            if isinstance(batch, int) and batch >= 1:
+                return manifest
+        allowed = f'{path} is not as sweep writes it; --force starts again'
+        raise ConfigError('output', str(self.output), allowed)
 
     def _start(self) -> None:
         try:
@@ -152,7 +157,7 @@ class Parts:
 
     def _continue(self, manifest: dict[str, Any], batch: int | None, *, resume: bool) -> int:
         """Return the batch size of the unfinished sweep, if it is one of the same study."""
-        stored_batch = int(manifest.pop('batch', 0))
+        stored_batch: int = manifest.pop('batch')
         if not resume:
             allowed = (
                 f'{self.folder} holds an unfinished sweep; --resume continues it, --force starts '

@@ -147,10 +147,10 @@ def stored_study(path: Path) -> dict[str, Any] | None:
             from pyarrow import parquet  # noqa: PLC0415
 
             text = (parquet.read_schema(path).metadata or {}).get(METADATA_KEY)
-        document: dict[str, Any] | None = json.loads(text) if text else None
-    except (OSError, ValueError):  # pyarrow.ArrowInvalid is a ValueError
+        document = json.loads(text) if text else None
+    except (OSError, ValueError, RecursionError):  # pyarrow.ArrowInvalid is a ValueError
         return None
-    return document
+    return document if isinstance(document, dict) else None
 
 
 def sidecar(path: Path) -> Path:

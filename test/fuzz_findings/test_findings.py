@@ -14,9 +14,9 @@ pytest.importorskip('rclpy')
 
 from disc_sim_ros.analysis import checks, recording, resimulate, techdisc
 from disc_sim_ros.analysis.odometry import Motion, motions
-from disc_sim_ros.bags import schemas
+from disc_sim_ros.bags import metadata, schemas
 from disc_sim_ros.bags.reader import RawMessage, open_bag
-from disc_sim_ros.bags.topic import Topic
+from disc_sim_ros.bags.topic import Topic, parse_qos
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
@@ -70,6 +70,31 @@ def test_a_definition_that_is_none_is_told_in_one_line(tmp_path, definition):
     with pytest.raises(BagError, match='/a') as refused:
         list(open_bag(tmp_path / 'bag').messages())
     assert '\n' not in str(refused.value)
+
+
+NOT_METADATA = (
+    'message_count: .inf',
+    'message_count: ' + '9' * 5000,
+    '[' * 3000,
+    'a: &a [*a]',
+    '- 1',
+    'null',
+)
+
+
+@pytest.mark.parametrize('text', NOT_METADATA)
+def test_what_is_no_metadata_is_refused_in_one_line_and_the_messages_are_read(tmp_path, text):
+    for parse in (metadata.parse, parse_qos):
+        with pytest.raises(BagError) as refused:
+            parse(f'topics_with_message_count: []\nrelative_file_paths: []\n{text}')
+        assert '\n' not in str(refused.value)
+    topic = Topic(name='/a', type='std_msgs/msg/String', definition='string data')
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.write(writer.add(topic), b'\x00\x01\x00\x00\x03\x00\x00\x00hi\x00', START, START)
+        writer.note(metadata.RECORD, {metadata.KEY: text})
+    (tmp_path / 'bag' / metadata.FILE_NAME).write_text(text, encoding='utf-8')
+    (message,) = open_bag(tmp_path / 'bag').raw()
+    assert message.topic == '/a'
 
 
 def odometry(log_time, number=0.0):

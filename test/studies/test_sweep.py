@@ -322,6 +322,20 @@ def test_a_full_disk_is_reported_in_one_line_and_finished_flights_are_kept(expec
         assert_same(read(path), expected)
 
 
+@pytest.mark.parametrize(
+    'text', ['', '[]', 'null', '{}', '{"batch": 1e999}', '{"batch": 0}', '[' * 99999]
+)
+def test_a_damaged_note_of_an_unfinished_sweep_is_refused_in_one_line(tmp_path, text):
+    path = tmp_path / 'a.parquet'
+    stopped_sweep(path, after=50)
+    (note,) = tmp_path.rglob('*.json')
+    note.write_text(text, encoding='utf-8')
+    with pytest.raises(ConfigError, match=r'--force starts again') as refused:
+        sweep(STUDY, path, resume=True)
+    assert '\n' not in str(refused.value)
+    sweep(STUDY, path, force=True)
+
+
 def test_a_disk_that_fills_up_at_the_end_keeps_the_parts(expected, tmp_path):
     disk = tmp_path / 'disk'
     with small_disk(disk, 4 * 1024 * 1024):

@@ -143,7 +143,7 @@ class LiveServer(threading.Thread):
     def _answer(self, text: str | bytes) -> str:
         try:
             values = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             return 'error: not JSON'
         if not isinstance(values, dict):
             return 'error: not an object'

@@ -137,8 +137,9 @@ def test_only_who_has_the_token_throws():
         assert not thrown
         assert answer(viewer, speed=1.0, token=server.token) == 'thrown'
         assert answer(viewer, speed=0.0, token=server.token) == 'error: too slow'
-        viewer.send('not JSON')
-        assert json.loads(viewer.recv(DEADLINE)) == {'answer': 'error: not JSON'}
+        for text in ('not JSON', '[' * 4000):
+            viewer.send(text)
+            assert json.loads(viewer.recv(DEADLINE)) == {'answer': 'error: not JSON'}
     assert thrown == [{'speed': 1.0}]
 
 
