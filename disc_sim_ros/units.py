@@ -1,6 +1,8 @@
-"""Units and their factors to SI: those that a user may write, such as '60mph', and nanoseconds."""
+"""Units: those that a user may write, such as '60mph', and those in which programs answer."""
 
+from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 NANOSECONDS = 1_000_000_000  # per second
 
@@ -44,3 +46,35 @@ def split(text: str) -> tuple[str, str]:
 def spellings(unit: str) -> str:
     """Return the units that may stand behind a number of this unit, for people."""
     return ', '.join(UNITS.get(unit, {}))
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """A system of units for people, by the names of `UNITS`.
+
+    Attributes:
+        length: Unit of heights and distances.
+        speed: Unit of speeds.
+        spin: Unit of spin rates.
+    """
+
+    length: str
+    speed: str
+    spin: str
+
+    def unit(self, si: str) -> str:
+        """Return the unit in which a quantity of this SI unit is shown; angles and times stay."""
+        return {'m': self.length, 'm/s': self.speed, 'rad/s': self.spin}.get(si, si)
+
+    def number(self, value: Any, si: str) -> Any:
+        """Return a value, or an array of values, in the unit in which it is shown."""
+        unit = self.unit(si)
+        return value if unit == si else value / UNITS[si][unit]
+
+    def text(self, value: float, si: str, form: str = '.2f') -> str:
+        """Return a value as a number, in a form of `format`, with its unit."""
+        return f'{self.number(value, si):{form}} {self.unit(si)}'
+
+
+METRIC = System('m', 'm/s', 'rad/s')
+SYSTEMS = {'metric': METRIC, 'us': System('ft', 'mph', 'rpm')}

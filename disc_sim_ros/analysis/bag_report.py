@@ -10,12 +10,12 @@ import numpy as np
 from disc_sim_ros import topics
 from disc_sim_ros.analysis.bag_analysis import Analysis
 from disc_sim_ros.analysis.checks import Stamps, turns_with_spin
-from disc_sim_ros.analysis.flight_report import sideways
+from disc_sim_ros.analysis.flight_report import gusts_text, sideways, wind_text
 from disc_sim_ros.analysis.recording import Began, Change, Flight
 from disc_sim_ros.errors import printable
 from disc_sim_ros.physics import frames, theory
 from disc_sim_ros.physics.flight_config import Key
-from disc_sim_ros.units import NANOSECONDS
+from disc_sim_ros.units import METRIC, NANOSECONDS, System
 
 _SETUP = (
     Key.DISC,
@@ -153,18 +153,18 @@ def _change_document(change: Change, flight: Flight) -> dict[str, Any]:
 # ---- lines to read ----
 
 
-def summary(a: Analysis) -> str:
+def summary(a: Analysis, system: System = METRIC) -> str:
     """Return an analysis in a few lines to read."""
-    d = document(a)
+    d, text = document(a), system.text
     launch, setup = d['launch'], d['setup']
     what = '' if setup is None else f'{_disc_and_model(setup)}, '
     when = datetime.fromtimestamp(a.flight.start / NANOSECONDS, UTC)
     lines = [
         f'  flight {a.flight.number}: {what}{when:%Y-%m-%d %H:%M:%S} UTC'
         + (f', {d["starts_late_s"]:.3f} s of it before the bag' if d['starts_late_s'] else ''),
-        f'    {_start_word(a.flight)} {launch["speed_m_s"]:.2f} m/s, '
-        f'{_attitude_text(launch)}, {launch["height_m"]:.2f} m up',
-        f'    spin      {_spin_text(launch["spin_rad_s"])}',
+        f'    {_start_word(a.flight)} {text(launch["speed_m_s"], "m/s")}, '
+        f'{_attitude_text(launch)}, {text(launch["height_m"], "m")} up',
+        f'    spin      {_spin_text(launch["spin_rad_s"], system)}',
     ]
     if a.flight.began is Began.IN_FLIGHT:
         lines.append('    began     in flight: the bag holds neither the throw nor rest before it')
@@ -175,22 +175,24 @@ def summary(a: Analysis) -> str:
         )
     if launch['frame_spins']:
         lines.append('    frame     turns with the spin: roll, pitch and yaw go round with it')
-    lines += _wind_lines(setup)
+    lines += _wind_lines(setup, system)
     lines += _steering_lines(a.flight)
     if d['landed']:
         x, y, _ = d['landing_position_m']
         left = '' if d['spin_left'] is None else f', {d["spin_left"]:.1%} of the spin left'
         lines.append(
-            f'    landed    after {d["flight_time_s"]:.3f} s at x {x:.2f} m, y {y:.2f} m{left}'
+            f'    landed    after {d["flight_time_s"]:.3f} s at x {text(x, "m")}, '
+            f'y {text(y, "m")}{left}'
         )
     else:
         x, y, z = d['end_position_m']
         lines.append(
-            f'    ended     after {d["flight_time_s"]:.3f} s in the air at x {x:.2f} m, '
-            f'y {y:.2f} m, z {z:.2f} m ({a.flight.ended})'
+            f'    ended     after {d["flight_time_s"]:.3f} s in the air at x {text(x, "m")}, '
+            f'y {text(y, "m")}, z {text(z, "m")} ({a.flight.ended})'
         )
     lines.append(
-        f'    range     {d["range_m"]:.2f} m, {sideways(d["drift_m"])}, apex {d["apex_m"]:.2f} m'
+        f'    range     {text(d["range_m"], "m")}, {sideways(d["drift_m"], system)}, '
+        f'apex {text(d["apex_m"], "m")}'
     )
     lines.append(f'    messages  {_stamps_text(a.stamps)}')
     if not a.flight.motion.is_stamped:
@@ -201,16 +203,17 @@ def summary(a: Analysis) -> str:
     return '\n'.join(lines)
 
 
-def title(a: Analysis) -> str:
+def title(a: Analysis, system: System = METRIC) -> str:
     """Return one line with what flew and how far."""
     d = document(a)
     launch, setup = d['launch'], d['setup']
     what = printable(a.flight.disc.name) if setup is None else _disc_and_model(setup)
     known = not math.isnan(launch['roll_deg'])
-    turning = f', pitch {launch["pitch_deg"]:.3g}°, spin {launch["spin_rad_s"]:.4g} rad/s'
+    spin = system.text(launch['spin_rad_s'], 'rad/s', '.4g')
+    turning = f', pitch {launch["pitch_deg"]:.3g}°, spin {spin}'
     return (
-        f'{what}: {launch["speed_m_s"]:.4g} m/s{turning if known else ""}; '
-        f'{d["range_m"]:.1f} m in {d["flight_time_s"]:.2f} s'
+        f'{what}: {system.text(launch["speed_m_s"], "m/s", ".4g")}{turning if known else ""}; '
+        f'{system.text(d["range_m"], "m", ".1f")} in {d["flight_time_s"]:.2f} s'
     )
 
 
@@ -254,26 +257,27 @@ def _attitude_text(launch: Mapping[str, Any]) -> str:
     )
 
 
-def _spin_text(spin: float) -> str:
+def _spin_text(spin: float, system: System) -> str:
     if math.isnan(spin):
         return 'unknown'
-    return f'{spin:.2f} rad/s, {"clockwise" if spin >= 0.0 else "anticlockwise"} from above'
+    turns = 'clockwise' if spin >= 0.0 else 'anticlockwise'
+    return f'{system.text(spin, "rad/s")}, {turns} from above'
 
 
 def _disc_and_model(setup: Mapping[str, Any]) -> str:
     return printable(f'{setup[Key.DISC]}, {setup[Key.MODEL]} model')
 
 
-def _wind_lines(setup: Mapping[str, Any] | None) -> list[str]:
+def _wind_lines(setup: Mapping[str, Any] | None, system: System) -> list[str]:
     if setup is None:
         return []
     wind = setup[Key.WIND]
     mean = [float(wind[axis]) for axis in 'xyz']
     lines = []
     if any(mean):
-        lines.append(f'    wind      {mean[0]:g} {mean[1]:g} {mean[2]:g} m/s (forward, left, up)')
+        lines.append(f'    wind      {wind_text(mean, system)}')
     if wind.get('turbulence'):
-        lines.append(f'    gusts     {wind["turbulence"]:g} m/s at 6 m, seed {wind["seed"]}')
+        lines.append(f'    gusts     {gusts_text(wind["turbulence"], wind["seed"], system)}')
     return lines
 
 

@@ -1,5 +1,6 @@
 """Reports of a simulated flight: a document for programs, a table, and a summary to read."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 import math
 from typing import Any
@@ -12,6 +13,7 @@ from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight import Flight, Setup
 from disc_sim_ros.physics.theory import advance_ratio
 from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.units import METRIC, System
 
 
 def document(flight: Flight) -> dict[str, Any]:
@@ -108,8 +110,9 @@ def _steps(setup: Setup) -> str:
     return f'RK4 step {setup.step * 1e3:g} ms'
 
 
-def summary(flight: Flight) -> str:
+def summary(flight: Flight, system: System = METRIC) -> str:
     """Return a flight in a few lines to read."""
+    text = system.text
     launch, setup = flight.launch, flight.setup
     wind = frames.map_from_paper(setup.wind.mean) + 0.0
     turns = 'clockwise' if launch.spin >= 0.0 else 'anticlockwise'
@@ -122,10 +125,10 @@ def summary(flight: Flight) -> str:
         f'{setup.disc.name}: {setup.disc.description or "no description"}',
         f'  model   {setup.model}, {setup.aero or setup.disc.aero} aerodynamics, '
         f'moments in {setup.moment_axes} axes, {_steps(setup)}',
-        f'  launch  {launch.speed:g} m/s, pitch {launch.pitch:g}, roll {launch.roll:g}, '
-        f'yaw {launch.yaw:g}, angle of attack {launch.angle_of_attack:g} degrees, '
-        f'{launch.height:g} m up',
-        f'  spin    {launch.spin:g} rad/s, {turns} from above{ratio}',
+        f'  launch  {text(launch.speed, "m/s", "g")}, pitch {launch.pitch:g}, '
+        f'roll {launch.roll:g}, yaw {launch.yaw:g}, '
+        f'angle of attack {launch.angle_of_attack:g} degrees, {text(launch.height, "m", "g")} up',
+        f'  spin    {text(launch.spin, "rad/s", "g")}, {turns} from above{ratio}',
     ]
     if any((launch.sideslip, launch.roll_rate, launch.pitch_rate)):
         lines.append(
@@ -133,43 +136,65 @@ def summary(flight: Flight) -> str:
             f'pitch rate {launch.pitch_rate:g} rad/s'
         )
     if np.any(wind != 0.0):
-        lines.append(f'  wind    {wind[0]:g} {wind[1]:g} {wind[2]:g} m/s (forward, left, up)')
+        lines.append(f'  wind    {wind_text(wind, system)}')
     if setup.wind.turbulence:
-        lines.append(f'  gusts   {setup.wind.turbulence:g} m/s at 6 m, seed {setup.wind.seed}')
+        lines.append(f'  gusts   {gusts_text(setup.wind.turbulence, setup.wind.seed, system)}')
     control = flight.control
     if any((control.C_L, control.C_M, control.C_N)):
         lines.append(f'  control C_L {control.C_L:g}, C_M {control.C_M:g}, C_N {control.C_N:g}')
     ended = 'landed ' if flight.landed else 'in the air'
     lines += [
-        f'  {ended} after {flight.time:.3f} s at x {flight.position[0]:.2f} m, '
-        f'y {flight.position[1]:.2f} m, z {flight.position[2]:.2f} m',
+        f'  {ended} after {flight.time:.3f} s at x {text(flight.position[0], "m")}, '
+        f'y {text(flight.position[1], "m")}, z {text(flight.position[2], "m")}',
         *(['  (on the ground and not climbing: try --height 1)'] if flight.time == 0.0 else []),
-        f'  range   {flight.range:.2f} m, {sideways(flight.drift)}, apex {flight.apex:.2f} m',
-        f'  speed   {math.hypot(*flight.end[3:6]):.2f} m/s at the end'
+        f'  range   {text(flight.range, "m")}, {sideways(flight.drift, system)}, '
+        f'apex {text(flight.apex, "m")}',
+        f'  speed   {text(math.hypot(*flight.end[3:6]), "m/s")} at the end'
         + (f', {flight.end.r / launch.spin:.1%} of the spin left' if launch.spin else ''),
     ]
     return '\n'.join(lines)
 
 
-def samples_text(trajectory: Trajectory) -> str:
-    """Return the samples as an aligned table to read."""
+def wind_text(wind: Sequence[float] | FloatArray, system: System = METRIC) -> str:
+    """Return a wind in `map` axes [m/s], to read."""
+    x, y, z = (system.number(float(w), 'm/s') for w in wind)
+    return f'{x:g} {y:g} {z:g} {system.speed} (forward, left, up)'
+
+
+def gusts_text(turbulence: float, seed: int, system: System = METRIC) -> str:
+    """Return the gusts of a mean wind at 6 m [m/s], to read."""
+    at = system.text(6.0, 'm', '.3g')
+    return f'{system.text(turbulence, "m/s", "g")} at {at}, seed {seed}'
+
+
+def samples_text(trajectory: Trajectory, system: System = METRIC) -> str:
+    """Return the samples as an aligned table to read; angles in degrees."""
     samples = columns(trajectory)
-    head = '     t s      x m      y m      z m   V m/s  alpha   roll  pitch lambda   spin  AdvR'
-    lines = [head]
-    position = samples['position_m']
+    lines = [
+        '     t s '
+        + ' '.join(f'{f"{axis} {system.length}":>8}' for axis in 'xyz')
+        + f' {f"V {system.speed}":>7}  alpha   roll  pitch lambda {_spin_head(system):>6}  AdvR'
+    ]
+    position = system.number(samples['position_m'], 'm')
+    airspeed = system.number(samples['airspeed_m_s'], 'm/s')
+    spin = system.number(samples['spin_rad_s'], 'rad/s')
     angles = ('alpha_deg', 'roll_deg', 'pitch_deg', 'absolute_attitude_deg')
     for i, t in enumerate(trajectory.t):
         x, y, z = position[i]
-        line = f'{t:8.3f} {x:8.3f} {y:8.3f} {z:8.3f} {samples["airspeed_m_s"][i]:7.2f}'
+        line = f'{t:8.3f} {x:8.3f} {y:8.3f} {z:8.3f} {airspeed[i]:7.2f}'
         line += ''.join(f' {samples[name][i]:6.1f}' for name in angles)
-        line += f' {samples["spin_rad_s"][i]:6.2f} {samples["advance_ratio"][i]:5.2f}'
+        line += f' {spin[i]:6.2f} {samples["advance_ratio"][i]:5.2f}'
         lines.append(line)
     return '\n'.join(lines)
 
 
-def sideways(drift: float) -> str:
+def _spin_head(system: System) -> str:
+    return 'spin' if system is METRIC else system.spin
+
+
+def sideways(drift: float, system: System = METRIC) -> str:
     """Return a drift in words; positive is left [m]."""
-    return f'drift {abs(drift):.2f} m to the {"left" if drift >= 0.0 else "right"}'
+    return f'drift {system.text(abs(drift), "m")} to the {"left" if drift >= 0.0 else "right"}'
 
 
 def _plain(value: Any) -> Any:

@@ -1,6 +1,6 @@
 """Which files make a bag: what is on the disk comes first, then what metadata.yaml says of it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 import re
@@ -306,8 +306,11 @@ def _compare(path: Path, listed: BagMetadata, present: Sequence[Path]) -> BagFol
     if missing:
         rest |= {f.name: f for f in _mcap_by_content(path)}
     losses = []
+    listed_stems = _stems(listed)
+    contents = {f: _indexed(f) for f in rest.values()} if missing else {}
     for info in missing:
-        other = _substitute(info, len(missing), listed, list(rest.values()))
+        candidates = {f: contents[f] for f in rest.values()}
+        other = _substitute(info, len(missing), listed_stems, candidates)
         if other is None:
             loss = Loss(path / info.path, 0, 0, 'the file is missing', info.message_count)
         else:
@@ -316,7 +319,7 @@ def _compare(path: Path, listed: BagMetadata, present: Sequence[Path]) -> BagFol
             loss = Loss(path / info.path, 0, 0, f'it is missing; {other.name} stands for it', 0)
         losses.append(loss)
     # The recorder may have been killed between a new file and the metadata that lists it.
-    stems = _stems(listed) | {_stem(f.name) for f in infos}
+    stems = listed_stems | {_stem(f.name) for f in infos}
     more = [f for f in rest.values() if not infos or _stem(f.name) in stems - {None}]
     if missing:
         losses += [
@@ -335,15 +338,14 @@ def _stems(listed: BagMetadata) -> set[str | None]:
 
 
 def _substitute(
-    info: FileInfo, missing: int, listed: BagMetadata, candidates: Sequence[Path]
+    info: FileInfo, missing: int, stems: set[str | None], contents: Mapping[Path, Contents | None]
 ) -> Path | None:
     """Return the file that was renamed: of the same content, or the same number, or the last."""
     number = _number(Path(info.path).name)
-    contents = {f: _indexed(f) for f in candidates}
     fitting = {f: c for f, c in contents.items() if _may_be(c, info)}
     same = [f for f, c in fitting.items() if c and c.message_count == info.message_count != 0]
     numbered = [f for f in fitting if number is not None and _number(f.name) == number]
-    strange = [f for f in fitting if _stem(f.name) not in _stems(listed) - {None}]
+    strange = [f for f in fitting if _stem(f.name) not in stems - {None}]
     only = strange if missing == 1 else []
     return next((group[0] for group in (same, numbered, only) if len(group) == 1), None)
 

@@ -97,7 +97,7 @@ def parse(text: str) -> BagMetadata:
         content = yaml.load(text, Loader=LOADER)  # noqa: S506 - a SafeLoader
         root = content.get(_ROOT, content)
         return BagMetadata(
-            topics=tuple(_parsed_topic(t) for t in root['topics_with_message_count'] or ()),
+            topics=tuple(_parsed_topic(t) for t in _list_of(root['topics_with_message_count'])),
             files=tuple(_parsed_files(root)),
             custom_data={str(k): str(v) for k, v in (root.get('custom_data') or {}).items()},
             ros_distro=str(root.get('ros_distro') or ''),
@@ -235,10 +235,19 @@ def _parsed_topic(item: Any) -> TopicInfo:
     )
 
 
+def _list_of(value: Any) -> list[Any]:
+    """Return a sequence of YAML; a text is none, though Python would give its characters."""
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise TypeError(f'{value!r:.40} is no list')
+    return value
+
+
 def _parsed_files(root: Any) -> list[FileInfo]:
-    infos = {_plain_path(f['path']): f for f in root.get('files') or ()}
+    infos = {_plain_path(f['path']): f for f in _list_of(root.get('files'))}
     files = []
-    for path in root['relative_file_paths'] or ():
+    for path in _list_of(root['relative_file_paths']):
         info = infos.get(_plain_path(path))
         if info is None:
             files.append(FileInfo(path=str(path)))

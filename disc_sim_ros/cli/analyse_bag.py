@@ -14,6 +14,7 @@ from disc_sim_ros.cli import output, pages
 from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError, printable
+from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
     from disc_sim_ros.analysis.bag_analysis import Analysis
@@ -45,6 +46,7 @@ def parser(prog: str = 'analyse_bag') -> Parser:
     p.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'
     )
+    output.add_units(p)
     output.add_plot(p)
     pages.add_page(p)
     p.add_argument(
@@ -89,7 +91,7 @@ def _run(chosen: argparse.Namespace) -> int:
     ]
     every = [a for _, analyses in analysed for a in analyses]
     if plot is not None:
-        _plot(plot, chosen.bag, every)
+        _plot(plot, chosen, every)
     if chosen.json:
         document = _bag_document(bag) | {
             'discs': [_disc_document(disc, analyses, chosen) for disc, analyses in analysed]
@@ -98,7 +100,7 @@ def _run(chosen: argparse.Namespace) -> int:
     else:
         lines = _bag_lines(bag)
         for disc, analyses in analysed:
-            lines += _disc_lines(disc, analyses, verify=chosen.verify)
+            lines += _disc_lines(disc, analyses, chosen)
         if plot is not None:
             lines.append(f'wrote {plot}')
         output.show('\n'.join(lines))
@@ -127,12 +129,14 @@ def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
     return chosen
 
 
-def _plot(name: str, bag: str, analyses: 'Sequence[Analysis]') -> None:
+def _plot(name: str, chosen: argparse.Namespace, analyses: 'Sequence[Analysis]') -> None:
     if not analyses:
-        raise DiscSimError(f'{bag}: there is no flight to plot')
+        raise DiscSimError(f'{chosen.bag}: there is no flight to plot')
     from disc_sim_ros.analysis import bag_report, plots  # noqa: PLC0415 - matplotlib
 
-    title = bag_report.title(analyses[0]) if len(analyses) == 1 else Path(bag).name
+    system = SYSTEMS[chosen.units]
+    one = len(analyses) == 1
+    title = bag_report.title(analyses[0], system) if one else Path(chosen.bag).name
     output.write_plot(name, plots.bag_figure(analyses, title))
 
 
@@ -140,7 +144,8 @@ def _write_page(chosen: argparse.Namespace, analyses: 'Sequence[Analysis]') -> s
     if not analyses:
         raise DiscSimError(f'{chosen.bag}: there is no flight to show')
     name = Path(chosen.bag).resolve().name
-    return pages.write(chosen, [pages.recorded(a) for a in analyses], name, 'metric')
+    system = SYSTEMS[chosen.units]
+    return pages.write(chosen, [pages.recorded(a, system) for a in analyses], name, system)
 
 
 def _bag_document(bag: 'Bag') -> dict[str, Any]:
@@ -214,15 +219,17 @@ def _bag_lines(bag: 'Bag') -> list[str]:
     return lines + [printable(f'  {key}: {value}') for key, value in losses(bag.custom_data)]
 
 
-def _disc_lines(disc: 'Disc', analyses: 'Sequence[Analysis]', *, verify: bool) -> list[str]:
+def _disc_lines(
+    disc: 'Disc', analyses: 'Sequence[Analysis]', chosen: argparse.Namespace
+) -> list[str]:
     from disc_sim_ros.analysis import bag_report  # noqa: PLC0415
 
     lines = [printable(f'{disc.name}: {disc.motion.topic}, {len(disc.motion)} messages')]
     if not analyses:
         lines.append('  no flight: no throw was recorded, and the disc does not move')
     for a in analyses:
-        lines.append(bag_report.summary(a))
-        if verify:
+        lines.append(bag_report.summary(a, SYSTEMS[chosen.units]))
+        if chosen.verify:
             lines.append(bag_report.verification_text(a))
     return lines
 

@@ -19,6 +19,7 @@ from disc_sim_ros.cli.main import DIFFERENT, run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
 from disc_sim_ros.quantities import DURATION, TIMING
+from disc_sim_ros.units import SYSTEMS, System
 
 if TYPE_CHECKING:
     from disc_sim_ros.analysis.bag_analysis import Analysis
@@ -44,6 +45,7 @@ def parser(prog: str = 'demo') -> Parser:
     flags.add_launch(p)
     flags.add_air(p, 'air and control inputs')
     kept = p.add_argument_group('recording')
+    output.add_units(kept)
     text = 'longest time to wait for the landing'
     add_quantity(kept, '--seconds', DURATION.within(0.1), dest='seconds', text=text)
     kept.add_argument(
@@ -82,7 +84,7 @@ def _run(chosen: argparse.Namespace) -> int:
     finally:
         with suppress(OSError):
             bag.parent.rmdir()  # removes it only if nothing was recorded
-    return _report(bag, plot)
+    return _report(bag, plot, SYSTEMS[chosen.units])
 
 
 def _new_paths(bag: str | None) -> tuple[Path, Path]:
@@ -212,7 +214,7 @@ class _Progress:
             self._open = True
 
 
-def _report(bag: Path, plot: Path) -> int:
+def _report(bag: Path, plot: Path, system: System) -> int:
     """Analyse the bag, write the plot, print the summary; return the exit code."""
     from disc_sim_ros.analysis import bag_analysis, bag_report, flights, plots, recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
@@ -222,15 +224,15 @@ def _report(bag: Path, plot: Path) -> int:
     analyses = [bag_analysis.analyse(f) for f in flights.flights(disc)]
     if not analyses:
         raise DiscSimError(f'{bag}: the bag does not hold the throw')
-    title = bag_report.title(analyses[0])
+    title = bag_report.title(analyses[0], system)
     image = plots.image(plots.bag_figure(analyses, title), 'png')
     output.write_whole('--bag', str(plot), image)
-    page = _page(bag, plot.with_suffix('.html'), analyses)
+    page = _page(bag, plot.with_suffix('.html'), analyses, system)
     size = sum(file.stat().st_size for file in opened.files)
     losses = bag_analysis.losses(opened.custom_data)
     filled = sum(info.message_count > 0 for info in opened.topics)
     lines = [
-        bag_report.summary(analyses[0]),
+        bag_report.summary(analyses[0], system),
         bag_report.verification_text(analyses[0]),
         f'recorded {opened.message_count} messages of {filled} topics, {size / 1e6:.1f} MB, '
         + (', '.join(f'{key}: {value}' for key, value in losses) or 'nothing lost'),
@@ -250,14 +252,13 @@ def _report(bag: Path, plot: Path) -> int:
     return 0 if all(a.passed for a in analyses) else DIFFERENT
 
 
-def _page(bag: Path, page: Path, analyses: 'Sequence[Analysis]') -> Path | None:
+def _page(bag: Path, page: Path, analyses: 'Sequence[Analysis]', system: System) -> Path | None:
     """Write the page of the flight; return None, after a note, if it cannot be written."""
     from disc_sim_ros.view.page import ViewerMissingError  # noqa: PLC0415
     from disc_sim_ros.view.page import page as page_of  # noqa: PLC0415
-    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
     try:
-        content = page_of([pages.recorded(a) for a in analyses], bag.name, SYSTEMS['metric'])
+        content = page_of([pages.recorded(a, system) for a in analyses], bag.name, system)
     except ViewerMissingError as error:
         output.note('demo', f'note: {error}')
         return None

@@ -17,6 +17,7 @@ from disc_sim_ros.physics import flight
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.trajectory import Trajectory
 from disc_sim_ros.quantities import SAMPLE_RATE
+from disc_sim_ros.units import SYSTEMS
 
 STDOUT = '-'  # as the name of a file
 DEFAULT_RATE = 100.0  # Hz, of files without --samples
@@ -53,12 +54,7 @@ def parser(prog: str = 'fly') -> Parser:
     )
     rates = SAMPLE_RATE.within(1e-3, 1e4)
     add_quantity(shown, '--samples', rates, dest='samples', text=text, default=argparse.SUPPRESS)
-    shown.add_argument(
-        '--units',
-        choices=('metric', 'us'),
-        default='metric',
-        help='of the table: m, m/s, rad/s or ft, mph, rpm',
-    )
+    output.add_units(shown)
     shown.add_argument(
         '--techdisc',
         type=path,
@@ -116,7 +112,7 @@ def _check_bag(name: str) -> None:
 
 def _run(chosen: argparse.Namespace) -> int:
     several = hasattr(chosen, 'techdisc') or len(getattr(chosen, 'discs', ())) > 1
-    report = _compare if several or chosen.units != 'metric' else _report
+    report = _compare if several else _report
     flown = report(chosen)
     if not pages.is_wanted(chosen):
         return 0
@@ -125,7 +121,7 @@ def _run(chosen: argparse.Namespace) -> int:
     if chosen.json or getattr(chosen, 'csv', None) == STDOUT:
         output.note(chosen.prog, line)
     else:
-        output.show(line if several or chosen.units != 'metric' else f'  {line}')
+        output.show(line if several else f'  {line}')
     return 0
 
 
@@ -154,7 +150,7 @@ def _report(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     if csv == STDOUT:
         output.show(flight_report.csv_text(flown.trajectory).rstrip('\n'))
         return names
-    lines = [flight_report.summary(flown)]
+    lines = [flight_report.summary(flown, SYSTEMS[chosen.units])]
     if csv is not None:
         output.write_whole('--csv', csv, flight_report.csv_text(flown.trajectory).encode())
         lines.append(f'  wrote   {csv}, {len(flown.trajectory)} rows')
@@ -166,7 +162,7 @@ def _report(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     elif write is not None:
         lines.append(f'  wrote   {write()}')
     elif rate > 0.0:
-        lines.append(flight_report.samples_text(flown.trajectory))
+        lines.append(flight_report.samples_text(flown.trajectory, SYSTEMS[chosen.units]))
     output.show('\n'.join(lines))
     return names
 
@@ -175,7 +171,7 @@ def _compare(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     """Fly each disc, with each throw of `--techdisc`, and show them side by side."""
     for name in ('csv', 'bag'):
         if hasattr(chosen, name):
-            allowed = 'it takes a single flight, in metric units'
+            allowed = 'it takes a single flight'
             raise ConfigError(f'--{name}', getattr(chosen, name), allowed)
     from disc_sim_ros.analysis import comparison, flight_report, techdisc  # noqa: PLC0415
 
@@ -203,7 +199,7 @@ def _compare(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
         ]
         output.show(json.dumps({'flights': documents}, allow_nan=False))
         return flown
-    lines = [comparison.table(names, flights, chosen.units)]
+    lines = [comparison.table(names, flights, SYSTEMS[chosen.units])]
     if plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
 
@@ -221,11 +217,10 @@ def _without_samples(flown: flight.Flight) -> flight.Flight:
 
 def _write_page(chosen: argparse.Namespace, flown: dict[str, flight.Flight]) -> str:
     from disc_sim_ros.view import shown  # noqa: PLC0415 - only with --html or --view
-    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
     system = SYSTEMS[chosen.units]
     flights = [shown.of_flight(f, name, system) for name, f in flown.items()]
-    return pages.write(chosen, flights, f'Flight of {", ".join(flown)}', chosen.units)
+    return pages.write(chosen, flights, f'Flight of {", ".join(flown)}', system)
 
 
 def _fly(

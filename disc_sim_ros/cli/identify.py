@@ -22,6 +22,7 @@ from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file, flight
 from disc_sim_ros.physics.disc import AERODYNAMICS
 from disc_sim_ros.quantities import COEFFICIENTS, IDENTIFICATION, LAUNCH, MEAN_WIND
+from disc_sim_ros.units import METRIC
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -413,7 +414,6 @@ def _page_of_throws(result: 'Identification') -> bytes:
     """Return a page of the fitted flights; empty without the package for pages."""
     from disc_sim_ros.view.page import ViewerMissingError, page  # noqa: PLC0415
     from disc_sim_ros.view.shown import ShownFlight  # noqa: PLC0415
-    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
     flights = [
         ShownFlight(
@@ -425,7 +425,7 @@ def _page_of_throws(result: 'Identification') -> bytes:
         for k, throw in enumerate(result.problem.throws)
     ]
     try:
-        return page(flights, 'Throws fitted by identify', SYSTEMS['metric'])
+        return page(flights, 'Throws fitted by identify', METRIC)
     except ViewerMissingError:
         return b''
 

@@ -17,6 +17,7 @@ from disc_sim_ros.cli.study_flags import listed
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.quantities import POSITION, STUDY
+from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
     from disc_sim_ros.studies.optimise import Problem
@@ -63,6 +64,7 @@ def parser(prog: str = 'optimise') -> Parser:
     add_quantity(what, '--count', counts, text=text, default=DEFAULT_COUNT)
     study_flags.add_seed(what, 'seed of the search, of the scatter and of the gusts')
     shown = p.add_argument_group('output (default: a summary to read)')
+    output.add_units(shown)
     shown.add_argument(
         '--json', action='store_true', help='print one JSON document instead of the summary'
     )
@@ -152,7 +154,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
         document = optimise_report.optimum_document(optimum, command)
         output.show(json.dumps(document, allow_nan=False))
         return 0
-    lines = [optimise_report.optimum_text(optimum, command)]
+    lines = [optimise_report.optimum_text(optimum, command, SYSTEMS[chosen.units])]
     if plot is not None:
         lines.append(f'  wrote    {plot}')
     output.show('\n'.join(lines))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from disc_sim_ros import files
 from disc_sim_ros.cli.arguments import path
 from disc_sim_ros.errors import ConfigError, DiscSimError, printable
+from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,6 +34,17 @@ def check_outputs(chosen: argparse.Namespace) -> None:
         value = getattr(chosen, dest, None)
         if value is not None and value is not False:
             check(value)
+
+
+def add_units(group: argparse._ActionsContainer) -> None:
+    """Add the flag `--units`; its value is a key of `units.SYSTEMS`."""
+    group.add_argument(
+        '--units',
+        choices=tuple(SYSTEMS),
+        default='metric',
+        help='of what is printed and of the page: m, m/s, rad/s or ft, mph, rpm; data files and '
+        'JSON keep SI units',
+    )
 
 
 def add_plot(group: argparse._ActionsContainer) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from disc_sim_ros.analysis.bag_analysis import Analysis
+    from disc_sim_ros.units import System
     from disc_sim_ros.view.shown import ShownFlight
 
 RATE = 200.0  # samples per second of a flight in a page, without --samples
@@ -63,7 +64,7 @@ def is_wanted(chosen: argparse.Namespace) -> bool:
     return hasattr(chosen, 'html') or bool(chosen.view)
 
 
-def recorded(analysis: 'Analysis') -> 'ShownFlight':
+def recorded(analysis: 'Analysis', system: 'System') -> 'ShownFlight':
     """Return a flight of a bag for a page.
 
     Raises:
@@ -78,7 +79,7 @@ def recorded(analysis: 'Analysis') -> 'ShownFlight':
         return shown.of_recording(
             analysis.trajectory,
             name,
-            bag_report.title(analysis),
+            bag_report.title(analysis, system),
             landed=known['landed'],
             wind_is_known=analysis.wind_is_known,
             turns_with_spin=known['launch']['frame_spins'],
@@ -88,7 +89,7 @@ def recorded(analysis: 'Analysis') -> 'ShownFlight':
 
 
 def write(
-    chosen: argparse.Namespace, flights: 'Sequence[ShownFlight]', title: str, units: str
+    chosen: argparse.Namespace, flights: 'Sequence[ShownFlight]', title: str, system: 'System'
 ) -> str:
     """Write the page that the flags ask for, open it, and return a line about it.
 
@@ -96,16 +97,15 @@ def write(
         chosen: The flags.
         flights: The flights.
         title: Heading of the page.
-        units: A key of `view.system.SYSTEMS`.
+        system: Units of the page.
 
     Raises:
         ConfigError: The file cannot be written.
         ViewerMissingError: trimesh is missing.
     """
     from disc_sim_ros.view.page import page  # noqa: PLC0415 - only with these flags
-    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
-    content = page(flights, title, SYSTEMS[units])
+    content = page(flights, title, system)
     name = getattr(chosen, 'html', None) or _new_name()
     flag = '--html' if hasattr(chosen, 'html') else '--view'
     output.write_whole(flag, name, content)

@@ -16,7 +16,7 @@ from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.quantities import MEAN_WIND, PREDICTION
-from disc_sim_ros.units import NANOSECONDS
+from disc_sim_ros.units import NANOSECONDS, SYSTEMS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,9 +62,7 @@ def parser(prog: str = 'predict') -> Parser:
     p.add_argument('--json', action='store_true', help='print one JSON document')
     output.add_plot(p)
     pages.add_page(p)
-    p.add_argument(
-        '--units', choices=('metric', 'us'), default='metric', help='of the page: m or ft'
-    )
+    output.add_units(p)
     return p
 
 
@@ -107,11 +105,10 @@ def _write_page(
     chosen: argparse.Namespace, throws: 'Sequence[FollowedThrow]', config: 'PredictorConfig'
 ) -> str:
     from disc_sim_ros.cli.predict_page import shown_throw  # noqa: PLC0415
-    from disc_sim_ros.view.system import SYSTEMS  # noqa: PLC0415
 
     flights = [shown_throw(throw, config, SYSTEMS[chosen.units]) for throw in throws]
     title = f'Landings predicted from {Path(chosen.source).resolve().name}'
-    return pages.write(chosen, flights, title, chosen.units)
+    return pages.write(chosen, flights, title, SYSTEMS[chosen.units])
 
 
 def _config(chosen: argparse.Namespace) -> 'PredictorConfig':

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.arrays import FloatArray
     from disc_sim_ros.estimation.predictor import PredictorConfig
     from disc_sim_ros.estimation.replay import FollowedThrow
-    from disc_sim_ros.view.system import System
+    from disc_sim_ros.units import System
 
 RATE = 200.0  # Hz, samples of the fitted flight
 _POINTS = 24  # of a predicted path, about
@@ -31,8 +31,8 @@ def shown_throw(
     ends = 'lands' if throw.is_complete else 'measured in part, would land'
     result = (
         f'{ends} after {last.landing_time - last.reference_time:.2f} s at '
-        f'x {system.lengths(x):.2f} {system.length}, '
-        f'{abs(system.lengths(y)):.2f} {system.length} to the {side}'
+        f'x {system.text(x, "m")}, '
+        f'{system.text(abs(y), "m")} to the {side}'
     )
     begin = last.reference_time
     ellipses = [half_axes(p.covariance[:2, :2], SHARE) for p in throw.predictions]

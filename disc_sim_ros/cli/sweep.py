@@ -19,6 +19,7 @@ from disc_sim_ros.cli.study_flags import listed
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.quantities import STUDY
+from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
     from disc_sim_ros.studies.study import Study
@@ -95,6 +96,7 @@ def parser(prog: str = 'sweep') -> Parser:
     )
     made.add_argument('--resume', action='store_true', help='continue an interrupted sweep')
     output.add_plot(made)
+    output.add_units(made)
     made.add_argument('--json', action='store_true', help='print the summary as one JSON document')
     return p
 
@@ -138,7 +140,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     if chosen.json:
         output.show(json.dumps(report.summary_document(summarised), allow_nan=False))
         return 0
-    lines = [report.summary_text(summarised)]
+    lines = [report.summary_text(summarised, SYSTEMS[chosen.units])]
     size = path.stat().st_size
     rate = f' in {duration(seconds)}, {bar.new / seconds:.0f} flights/s' if bar.new else ''
     lines.append(f'  wrote    {path}, {study.size} rows, {size / 1e6:.1f} MB{rate}')

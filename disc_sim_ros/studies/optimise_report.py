@@ -13,6 +13,7 @@ from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.studies.columns import CONTROL, LAUNCH, WIND, quantity
 from disc_sim_ros.studies.optimise import ACCURACY, Optimum, slack
 from disc_sim_ros.studies.study import Study, study_document
+from disc_sim_ros.units import METRIC, System
 
 WHAT = {'range': ('range', 'm'), 'time': ('time of flight', 's'),
          'accuracy': ('distance from the target', 'm')}  # fmt: skip
@@ -40,42 +41,46 @@ def still_flight(optimum: Optimum, sample_rate: float = 0.0) -> Flight:
     )
 
 
-def optimum_text(optimum: Optimum, command: str) -> str:
+def optimum_text(optimum: Optimum, command: str, system: System = METRIC) -> str:
     """Return an optimum as a few lines of text.
 
     Args:
         optimum: The optimum.
         command: The command that repeats its flight.
+        system: Units of the text.
     """
-    problem, flight = optimum.problem, still_flight(optimum)
+    problem, flight, text = optimum.problem, still_flight(optimum), system.text
     what, unit = WHAT[problem.goal]
     aim = 'least' if problem.goal == ACCURACY else 'greatest'
     statistic = statistic_of(optimum)
-    values = ', '.join(named_value(name, value) for name, value in optimum.launch.items())
-    x, y, _ = flight.position
+    values = ', '.join(named_value(name, value, system) for name, value in optimum.launch.items())
+    x, y, _ = (system.number(value, 'm') for value in flight.position)
     lines = [
         f'{problem.study.setup.disc.name}: {aim} {statistic}{what}',
         f'  launch   {values}',
-        f'  flight   {flight.range:.2f} m, x {x:.2f}, y {y:.2f} m, in {flight.time:.2f} s, apex '
-        f'{flight.apex:.2f} m'
-        + (f', {_miss(optimum, flight):.2f} m from the target' if problem.target else ''),
+        f'  flight   {text(flight.range, "m")}, x {x:.2f}, y {y:.2f} {system.length}, in '
+        f'{flight.time:.2f} s, apex {text(flight.apex, "m")}'
+        + (f', {text(_miss(optimum, flight), "m")} from the target' if problem.target else ''),
     ]
     if problem.scatters:
         spread = ', '.join(
-            f'{name} ± {law.sd:g} {quantity("", name).short_unit}'
+            f'{name} ± {_shown(law.sd, name, system)}'
             for name, law in problem.study.scatter.items()
             if hasattr(law, 'sd')
         )
-        r = optimum.results
+        r = system.number(optimum.results, unit)
         lines += [
             f'  scatter  {spread or "gusts"}: {len(r)} throws',
             f'  result   {what}: mean {r.mean():.2f}, sd {r.std(ddof=1):.2f}, 10 % below '
-            f'{np.percentile(r, 10):.2f}, 90 % below {np.percentile(r, 90):.2f} {unit}',
+            f'{np.percentile(r, 10):.2f}, 90 % below {np.percentile(r, 90):.2f} '
+            f'{system.unit(unit)}',
         ]
     flat = ', '.join(
-        f'{name} {low:.4g} to {high:.4g}' for name, (low, high) in optimum.flat.items()
+        f'{name} {_bare(low, name, system)} to {_bare(high, name, system)}'
+        for name, (low, high) in optimum.flat.items()
     )
-    lines.append(f'  flat     {slack(problem, optimum.value):.2g} {unit} worse at most: {flat}')
+    worse = text(slack(problem, optimum.value), unit, '.2g')
+    lines.append(f'  flat     {worse} worse at most: {flat}')
     if optimum.at_limit:
         lines.append(f'  limits   hold {" and ".join(optimum.at_limit)}')
     lines += [f'  tried    {optimum.launches} launches', f'  again    {command}']
@@ -162,7 +167,15 @@ def statistic_of(optimum: Optimum) -> str:
     return 'mean ' if percentile is None else f'{percentile:g} % percentile of the '
 
 
-def named_value(name: str, value: float) -> str:
+def named_value(name: str, value: float, system: System = METRIC) -> str:
     """Return a value with its name and unit."""
-    q = quantity('', name)
-    return f'{name.replace("_", " ")} {value:.6g} {q.short_unit}'.strip().replace(' °', '°')
+    number = _shown(value, name, system, '.6g')
+    return f'{name.replace("_", " ")} {number}'.strip().replace(' °', '°')
+
+
+def _shown(value: float, name: str, system: System, form: str = 'g') -> str:
+    return system.text(value, quantity('', name).short_unit, form)
+
+
+def _bare(value: float, name: str, system: System) -> str:
+    return f'{system.number(value, quantity("", name).short_unit):.4g}'

@@ -8,25 +8,26 @@ from disc_sim_ros.studies.columns import WIND, quantity
 from disc_sim_ros.studies.scatter import Normal
 from disc_sim_ros.studies.study import Study, study_document
 from disc_sim_ros.studies.summary import ELLIPSES, MAIN_RESULTS, Ellipse, Summary
+from disc_sim_ros.units import METRIC, System
 
 _ONE = {'degrees': 'degree'}
 _SHOWN = ('range_m', 'drift_m', 'time_s', 'apex_m')
 
 
-def summary_text(summary: Summary) -> str:
+def summary_text(summary: Summary, system: System = METRIC) -> str:
     """Return a summary as text that fits on one screen."""
     lines = [headline(summary)]
-    lines += _spread_lines(summary)
+    lines += _spread_lines(summary, system)
     study = summary.study
     if study.count > 1 and not study.vary and summary.ellipse is not None:
-        lines += _ellipse_lines(summary.ellipse)
+        lines += _ellipse_lines(summary.ellipse, system)
     for best in summary.best:
         what = {'range_m': 'furthest', 'time_s': 'longest'}[best.result]
-        where = ', '.join(_value(name, value) for name, value in best.values.items())
-        sd = f', sd {best.sd:.2f}' if study.count > 1 else ''
+        where = ', '.join(_value(name, value, system) for name, value in best.values.items())
         unit = best.result.rpartition('_')[2]
-        lines.append(f'  {what:9}{best.mean:.2f} {unit}{sd} at {where}')
-    lines += _sensitivity_lines(summary)
+        sd = f', sd {system.number(best.sd, unit):.2f}' if study.count > 1 else ''
+        lines.append(f'  {what:9}{system.text(best.mean, unit)}{sd} at {where}')
+    lines += _sensitivity_lines(summary, system)
     return '\n'.join(lines)
 
 
@@ -107,7 +108,7 @@ def columns_of(values: dict[str, float]) -> dict[str, float]:
     return {quantity('name', name).key: value for name, value in values.items()}
 
 
-def _spread_lines(summary: Summary) -> list[str]:
+def _spread_lines(summary: Summary, system: System) -> list[str]:
     if not summary.spreads:
         return ['  no flight ended as expected; try a longer --duration or a shorter --step']
     lines = ['                 mean       sd       5%      50%      95%    least greatest']
@@ -116,29 +117,29 @@ def _spread_lines(summary: Summary) -> list[str]:
         quantity_name, _, unit = name.rpartition('_')
         numbers = (s.mean, s.sd, *(s.percentiles[p] for p in (5.0, 50.0, 95.0)), s.least,
                    s.greatest)  # fmt: skip
-        text = ''.join(f' {x:8.2f}' for x in numbers)
-        lines.append(f'  {quantity_name:7}{unit:>3}{text}')
+        text = ''.join(f' {system.number(x, unit):8.2f}' for x in numbers)
+        lines.append(f'  {quantity_name:7}{system.unit(unit):>3}{text}')
     return lines
 
 
-def _ellipse_lines(ellipse: Ellipse) -> list[str]:
-    x, y = ellipse.centre
-    long, short, angle = ellipse.semi_axes(50)
+def _ellipse_lines(ellipse: Ellipse, system: System) -> list[str]:
+    x, y = (system.number(value, 'm') for value in ellipse.centre)
+    angle = ellipse.semi_axes(50)[2]
     side = 'left' if angle >= 0.0 else 'right'
     lines = [
-        f'  landings around x {x:.2f}, y {y:.2f} m; ellipses of a normal law, long axis '
-        f'{abs(angle):.0f} degrees {side} of x'
+        f'  landings around x {x:.2f}, y {y:.2f} {system.length}; ellipses of a normal law, '
+        f'long axis {abs(angle):.0f} degrees {side} of x'
     ]
     for percent in ELLIPSES:
-        long, short, _ = ellipse.semi_axes(percent)
+        long, short = (system.number(axis, 'm') for axis in ellipse.semi_axes(percent)[:2])
         lines.append(
-            f'    {percent}%: semi-axes {long:.2f} and {short:.2f} m, '
+            f'    {percent}%: semi-axes {long:.2f} and {short:.2f} {system.length}, '
             f'{ellipse.inside[percent]:.1%} of the landings inside'
         )
     return lines
 
 
-def _sensitivity_lines(summary: Summary) -> list[str]:
+def _sensitivity_lines(summary: Summary, system: System) -> list[str]:
     if not summary.sensitivities:
         return []
     lines = []
@@ -153,9 +154,11 @@ def _sensitivity_lines(summary: Summary) -> list[str]:
         lines.append(f'  {name} depends on (linear regression, R^2 {explained:.2f}{share})')
         for s in rows[:8]:
             q = quantity('name', s.quantity)
-            per = f'{unit} per {_ONE.get(q.unit, q.unit) or "1"}'
+            per_what = system.unit(q.unit)
+            per = f'{system.unit(unit)} per {_ONE.get(per_what, per_what) or "1"}'
+            per_unit = system.number(s.slope, unit) / system.number(1.0, q.unit)
             share = '' if s.first_order is None else f', share {s.first_order:6.1%}'
-            slope = f'{s.quantity:18}{s.slope:+11.4g} {per:16}'
+            slope = f'{s.quantity:18}{per_unit:+11.4g} {per:16}'
             lines.append(f'    {slope} {s.correlation:+.2f} sd per sd{share}')
     return lines
 
@@ -180,10 +183,8 @@ def _listed(matrix: FloatArray) -> list[list[float]]:
     return rows
 
 
-def _value(name: str, value: float) -> str:
-    q = quantity('name', name)
-    unit = f' {q.unit}' if q.unit else ''
-    return f'{name} {value:.6g}{unit}'
+def _value(name: str, value: float, system: System) -> str:
+    return f'{name} {system.text(value, quantity("name", name).unit, ".6g")}'.rstrip()
 
 
 def _with_unit(name: str, values: str) -> str:

@@ -9,9 +9,9 @@ from typing import Any
 from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.quantities import LAUNCH
+from disc_sim_ros.units import System
 from disc_sim_ros.view import predicted
 from disc_sim_ros.view.shown import MOST_SAMPLES, ShownFlight, curve_labels, document
-from disc_sim_ros.view.system import System
 
 TRIMESH = (5, 6)  # from and below: the page uses names of its viewer that are not promised
 MOST_SAMPLES_OF_PAGE = 24_000  # of all flights together: 5 MB
@@ -144,8 +144,8 @@ def _head(title: str, system: System) -> dict[str, Any]:
         'title': title,
         'camera': 'follow',
         'units': {'length': system.length, 'speed': system.speed},
-        'metresPerLength': 1.0 / system.lengths(1.0),
-        'metresPerSecondPerSpeed': 1.0 / system.speeds(1.0),
+        'metresPerLength': 1.0 / system.number(1.0, 'm'),
+        'metresPerSecondPerSpeed': 1.0 / system.number(1.0, 'm/s'),
         'colours': [_BLACK.get(colour, colour) for colour in COLOURS],
         'labels': [list(label) for label in curve_labels(system)],
     }

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.units import System
 from disc_sim_ros.view.rounding import plain
-from disc_sim_ros.view.system import System
 
 # A page holds fewer of them than samples of the flight, because each takes more space.
 _SAMPLES_A_MEASUREMENT = 4
@@ -59,7 +59,7 @@ def curves(shown: ShownPredictions, t: FloatArray, system: System) -> list[list[
     # The end of the flight may be a little after the last measurement, but not long after it.
     known = (which >= 0) & (t < shown.time[-1] + 0.1)
     return [
-        plain(np.where(known, system.lengths(values[which]), np.nan), 4)
+        plain(np.where(known, system.number(values[which], 'm'), np.nan), 4)
         for values in (shown.miss, shown.ellipse[:, 0])
     ]
 

@@ -8,10 +8,10 @@ import numpy as np
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.flight import Flight
 from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.units import System
 from disc_sim_ros.view import predicted
 from disc_sim_ros.view.predicted import ShownPredictions
 from disc_sim_ros.view.rounding import plain
-from disc_sim_ros.view.system import System
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)  # the attitude of a disc that lies on the ground, heading +x
 MOST_SAMPLES = 6000  # of one flight in a page; longer ones are thinned out evenly
@@ -60,8 +60,8 @@ def of_flight(flight: Flight, name: str, system: System) -> ShownFlight:
     side = 'left' if flight.drift >= 0.0 else 'right'
     result = (
         f'{ended} after {flight.time:.2f} s, '
-        f'range {system.lengths(flight.range):.1f} {system.length}, '
-        f'{abs(system.lengths(flight.drift)):.1f} {system.length} to the {side}'
+        f'range {system.text(flight.range, "m", ".1f")}, '
+        f'{system.text(abs(flight.drift), "m", ".1f")} to the {side}'
     )
     trajectory = Trajectory(rows, flight.trajectory.diameter)
     return ShownFlight(name, result, trajectory, flight.landed)
@@ -140,10 +140,10 @@ def document(flight: ShownFlight, system: System, most: int = MOST_SAMPLES) -> d
     wind = frames.map_from_paper(t.wind)
     euler = np.degrees(np.unwrap(t.euler, axis=0))
     curves = (
-        system.lengths(up[:, 2]),
-        system.speeds(t.airspeed),
+        system.number(up[:, 2], 'm'),
+        system.number(t.airspeed, 'm/s'),
         np.degrees(t.alpha),
-        system.spins(t.spin),
+        system.number(t.spin, 'rad/s'),
         euler[:, 1],
         euler[:, 0],
     )

@@ -14,7 +14,7 @@ pytest.importorskip('rclpy')
 
 from disc_sim_ros.analysis import checks, recording, resimulate, techdisc
 from disc_sim_ros.analysis.odometry import Motion, motions
-from disc_sim_ros.bags import metadata, schemas
+from disc_sim_ros.bags import bag_folder, metadata, schemas
 from disc_sim_ros.bags.reader import RawMessage, open_bag
 from disc_sim_ros.bags.topic import Topic, parse_qos
 from disc_sim_ros.bags.writer import BagWriter
@@ -236,3 +236,24 @@ def test_a_message_that_lacks_its_fields_is_told(tmp_path, topic, kind, definiti
         writer.write(other, b'\x00\x01\x00\x00' + bytes(16), START, START)
     with pytest.raises(BagError, match='not what its topic says'):
         recording.discs(open_bag(tmp_path / 'bag'))
+
+
+def test_metadata_that_names_thousands_of_files_reads_each_file_that_is_there_once(
+    tmp_path, monkeypatch
+):
+    """A text in the place of the list named each of its characters, in quadratic time."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        topic = Topic(name='/a', type='std_msgs/msg/String', definition='string data')
+        writer.write(writer.add(topic), b'\x00\x01\x00\x00\x03\x00\x00\x00hi\x00', START, START)
+    text = tmp_path / 'bag' / metadata.FILE_NAME
+    whole = text.read_text(encoding='utf-8')
+    read, looks = bag_folder.indexed, []
+    monkeypatch.setattr(bag_folder, 'indexed', lambda path: looks.append(path) or read(path))
+    for paths in ('"' + 'x' * 3000 + '"', str([f'lost_{n}.mcap' for n in range(3000)])):
+        listed = 'relative_file_paths:\n    - bag_0.mcap'
+        assert listed in whole
+        text.write_text(whole.replace(listed, f'relative_file_paths: {paths}'), encoding='utf-8')
+        looks.clear()
+        (message,) = open_bag(tmp_path / 'bag').raw()
+        assert message.topic == '/a'
+        assert len(looks) <= 2

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 import browser
 from disc_sim_ros import Launch, Setup, Wind, fly, load_disc
 from disc_sim_ros.physics import frames
+from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import shown
 from disc_sim_ros.view.page import page
-from disc_sim_ros.view.system import SYSTEMS
 
 pytest.importorskip('trimesh')
 pytestmark = [

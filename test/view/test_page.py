@@ -12,10 +12,10 @@ from disc_sim_ros.cli import fly as fly_command
 from disc_sim_ros.cli import pages
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
+from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import page as page_module
 from disc_sim_ros.view import shown
 from disc_sim_ros.view.page import ViewerMissingError, assembled, page
-from disc_sim_ros.view.system import SYSTEMS
 
 pytest.importorskip('trimesh')
 

@@ -14,9 +14,9 @@ from disc_sim_ros.estimation.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import predicted, shown
 from disc_sim_ros.view.page import page
-from disc_sim_ros.view.system import SYSTEMS
 from estimation.synthetic_throws import throw
 from view.test_browser import SIZES, TWO_FRAMES, picture, shown_at
 from view.test_page import data_of

@@ -9,8 +9,8 @@ import pytest
 from disc_sim_ros import Launch, Setup, fly, load_disc
 from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.physics.trajectory import Trajectory
+from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import shown
-from disc_sim_ros.view.system import SYSTEMS
 from view.test_page import data_of
 
 pytest.importorskip('trimesh')

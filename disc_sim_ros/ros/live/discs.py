@@ -18,9 +18,8 @@ from disc_sim_ros.physics.kernels.rotation import rotation_elements
 from disc_sim_ros.physics.trajectory import quantities
 from disc_sim_ros.ros.internals import PolledSubscription
 from disc_sim_ros.ros.qos import COMMAND_QOS, LATCHED_QOS, NEWEST_QOS
-from disc_sim_ros.units import NANOSECONDS
+from disc_sim_ros.units import NANOSECONDS, System
 from disc_sim_ros.view.shown import LEVEL
-from disc_sim_ros.view.system import System
 
 RARELY = 6  # updates between two looks at topics that change little
 DIAMETER = 0.27  # m, of a disc whose configuration is not known
@@ -126,10 +125,10 @@ class LiveDisc:
         state = _state_of(numbers)
         flown = quantities(state, Velocity(*frames.flip_yz(self._wind)), self._diameter)
         curves = (
-            system.lengths(numbers[2]),
-            system.speeds(flown.airspeed),
+            system.number(numbers[2], 'm'),
+            system.number(flown.airspeed, 'm/s'),
             math.degrees(flown.angle_of_attack),
-            system.spins(flown.spin_rate),
+            system.number(flown.spin_rate, 'rad/s'),
             *_pitch_and_roll(state),
         )
         values: dict[str, Any] = {

@@ -19,8 +19,8 @@ from disc_sim_ros.ros.live.discs import LiveDisc
 from disc_sim_ros.ros.live.options import LIVE_TABLE, live_config
 from disc_sim_ros.ros.live.server import LiveServer
 from disc_sim_ros.ros.recorder.polling_thread import PollingThread
+from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view.page import live_page
-from disc_sim_ros.view.system import SYSTEMS
 
 DISCOVERY_PERIOD = 0.5  # s between two looks at the graph
 _ODOMETRY = 'nav_msgs/msg/Odometry'

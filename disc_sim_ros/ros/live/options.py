@@ -8,7 +8,7 @@ from typing import Any
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.quantities import LIVE_VIEW
 from disc_sim_ros.ros.parameter_spec import ParameterSpec, checked, spec_of
-from disc_sim_ros.view.system import SYSTEMS
+from disc_sim_ros.units import SYSTEMS
 
 LOCAL = '127.0.0.1'
 LIVE_TABLE = (
