@@ -17,13 +17,25 @@ _NEGATIVE = re.compile(
 )
 
 
+class _HelpFormatter(argparse.HelpFormatter):
+    """Adds the default of each flag that has a value to its help, unless the help tells it."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        text, value = action.help, action.default
+        if text is None or '(default' in text or value is None or value is argparse.SUPPRESS:
+            return text
+        if action.nargs == 0 or isinstance(value, bool):
+            return text
+        values = value if isinstance(value, list | tuple) else [value]
+        numbers = ' '.join(f'{x:g}' if isinstance(x, float) else str(x) for x in values)
+        return f'{text} (default: {numbers.replace("%", "%%")})'
+
+
 class Parser(argparse.ArgumentParser):
     """A parser that refuses abbreviations and reports an error in one line."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__(
-            allow_abbrev=False, formatter_class=argparse.ArgumentDefaultsHelpFormatter, **kwargs
-        )
+        super().__init__(allow_abbrev=False, formatter_class=_HelpFormatter, **kwargs)
         self._negative_number_matcher = _NEGATIVE
 
     def error(self, message: str) -> NoReturn:

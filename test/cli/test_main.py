@@ -147,6 +147,18 @@ def test_each_program_knows_the_name_it_is_called_by(name, capsys):
     assert (code, capsys.readouterr()) == (0, (f'disc-sim {name} {__version__}\n', ''))
 
 
+@pytest.mark.parametrize('name', disc_sim.PROGRAMS)
+def test_help_tells_each_default_once_and_in_words_of_the_command_line(name, capsys):
+    try:
+        disc_sim.main([name, '--help'])
+    except SystemExit as ended:
+        assert not ended.code
+    text = ' '.join(capsys.readouterr().out.split())
+    assert 'usage' in text
+    assert not re.search(r'\(default: (?:None|True|False|\(|\[)', text)
+    assert not re.search(r'\(default: [^()]*\) \(default', text)
+
+
 @pytest.fixture(autouse=True)
 def signal_handlers():
     """Restore the handlers that a node sets."""
