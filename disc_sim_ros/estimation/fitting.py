@@ -22,6 +22,8 @@ _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, 
 _HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone
 _MOST_TRIES = 8  # of a step with more and more damping
 _KEPT = 3  # starts that are fitted, of those that are tried
+_MORE_KEPT = 12  # for a throw that fits worse than others
+ALIKE = 2.0  # ratio of the mean losses of two throws above which one is in a wrong minimum
 _FIRST_STEPS = 8
 # Attitudes about the path to start from: angle of attack and roll [degrees].
 _ATTACKS, _ROLLS = (-5.0, 5.0, 15.0), (-40.0, -20.0, 0.0, 20.0, 40.0)
@@ -264,12 +266,23 @@ def _solved(normal: FloatArray, right: FloatArray, damping: float) -> FloatArray
     return step
 
 
-def fitted_start(problem: Problem, k: int) -> tuple[Throw, FloatArray]:
-    """Fit throw `k` alone from many starts.
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """A throw that is fitted alone.
 
-    Returns:
-        The throw with changes counted from the best first state, and the shared parameters there.
+    Attributes:
+        throw: With changes counted from the best first state.
+        shared: The shared parameters, shape (s,).
+        loss: Mean loss of a residual.
     """
+
+    throw: Throw
+    shared: FloatArray
+    loss: float
+
+
+def fitted_alone(problem: Problem, k: int) -> Alone:
+    """Fit throw `k` alone from many starts."""
     throw = problem.throws[k]
     alone = replace(problem, throws=(throw,), margin=ROUGH)
     fitted: list[tuple[float, int, Problem, FloatArray]] = []
@@ -279,7 +292,8 @@ def fitted_start(problem: Problem, k: int) -> tuple[Throw, FloatArray]:
         fitted.append((solution.cost, len(fitted), around, solution.x))
     _, _, around, x = min(fitted, key=lambda entry: entry[:2])
     states, _, _ = around.states_and_rows(0, x[np.newaxis])
-    return throw.starting_at(states[0]), x[: problem.shared]
+    loss = float(robust_loss(around.residuals(0, x)).mean())
+    return Alone(throw.starting_at(states[0]), x[: problem.shared], loss)
 
 
 def retry_releases(
@@ -294,6 +308,10 @@ def retry_releases(
         The problem with changes counted from the best first states, the parameters there, and
         whether one of them is better than before.
     """
+    losses = [
+        float(robust_loss(problem.residuals(k, problem.here(k, x))).mean())
+        for k in range(len(problem.throws))
+    ]
 
     def retried(k: int) -> tuple[Throw, FloatArray, bool]:
         throw, here = problem.throws[k], problem.here(k, x)
@@ -302,7 +320,9 @@ def retry_releases(
         cost = cost_of_throw(problem, k, here)
         states, _, _ = problem.states_and_rows(k, here[np.newaxis])
         best = (throw, here, False)
-        for state in _promising(problem, k, here, starts(throw) + _neighbours(states[0])):
+        candidates = starts(throw) + _neighbours(states[0])
+        kept = _MORE_KEPT if losses[k] > ALIKE * min(losses) else _KEPT
+        for state in _promising(problem, k, here, candidates, kept):
             around = throw.starting_at(state)
             alone = replace(problem, throws=(around,))
             first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
@@ -320,7 +340,11 @@ def retry_releases(
 
 
 def _promising(
-    problem: Problem, k: int, here: FloatArray, candidates: Sequence[FloatArray]
+    problem: Problem,
+    k: int,
+    here: FloatArray,
+    candidates: Sequence[FloatArray],
+    kept: int = _KEPT,
 ) -> list[FloatArray]:
     """Return the first states of throw `k` that fit best as they are, the best first."""
     tried = np.tile(here, (len(candidates), 1))
@@ -328,7 +352,7 @@ def _promising(
         delta, turn = local.difference(problem.throws[k].start, state)
         row[problem.shared :] = [*delta, turn]
     losses = robust_loss(problem.whitened(k, tried)).sum(axis=1)
-    return [candidates[i] for i in np.argsort(losses, kind='stable')[:_KEPT]]
+    return [candidates[i] for i in np.argsort(losses, kind='stable')[:kept]]
 
 
 def _neighbours(state: FloatArray) -> list[FloatArray]:
@@ -345,9 +369,10 @@ def _neighbours(state: FloatArray) -> list[FloatArray]:
 
 def starts(throw: Throw) -> list[FloatArray]:
     """Return first states to start from: attitudes, senses of the spin and spin angles."""
-    attitudes = [throw.start[6:10]]
+    first = throw.guess
+    attitudes = [first[6:10]]
     if not throw.has(ATTITUDE):
-        velocity = throw.start[3:6]
+        velocity = first[3:6]
         attitudes += [
             local.attitude(axis_in_flow(velocity, math.radians(attack), math.radians(roll)))
             for attack, roll in itertools.product(_ATTACKS, _ROLLS)
@@ -356,7 +381,7 @@ def starts(throw: Throw) -> list[FloatArray]:
     angles = np.arange(_SPIN_ANGLES) * 2.0 * math.pi / _SPIN_ANGLES if throw.has(GYRO) else [0.0]
     result = []
     for attitude, sign, angle in itertools.product(attitudes, signs, angles):
-        state = throw.start.copy()
+        state = first.copy()
         state[6:10] = attitude
         state[12] *= sign
         c, s = math.cos(angle), math.sin(angle)

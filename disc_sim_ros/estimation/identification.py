@@ -12,12 +12,14 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import coefficients, errors, information, marginal, profile
 from disc_sim_ros.estimation.coefficients import NAMES, Base, base_of
 from disc_sim_ros.estimation.fitting import (
+    ALIKE,
     BETTER,
+    Alone,
     Best,
     Progress,
     Solution,
     fit_release,
-    fitted_start,
+    fitted_alone,
     retry_releases,
     solve,
 )
@@ -256,9 +258,9 @@ def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, Floa
     """Return the problem around the best start of each throw, and first parameters."""
     done = 0
 
-    def start(k: int) -> tuple[Throw, FloatArray]:
+    def start(k: int) -> Alone:
         nonlocal done
-        result = fitted_start(problem, k)
+        result = fitted_alone(problem, k)
         done += 1
         if progress is not None:
             progress('releases', done, float('nan'))
@@ -266,10 +268,36 @@ def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, Floa
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, len(problem.throws))) as pool:
         fitted = list(pool.map(start, range(len(problem.throws))))
-    problem = replace(problem, throws=tuple(throw for throw, _ in fitted))
+    problem = replace(problem, throws=tuple(alone.throw for alone in fitted))
     x = problem.means.copy()
-    x[: problem.shared] = np.median([shared for _, shared in fitted], axis=0)
-    return problem, x
+    x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)
+    least = min(alone.loss for alone in fitted)
+    good = [alone for alone in fitted if alone.loss < ALIKE * least]
+    if len(good) == len(fitted) and not all(throw.turns_only for throw in problem.throws):
+        return problem, x
+    return _agreeing(problem, x, good)
+
+
+def _agreeing(
+    problem: Problem, x: FloatArray, good: Sequence[Alone]
+) -> tuple[Problem, FloatArray]:
+    """Return the problem and parameters of the throw that explains the others best.
+
+    Some throws alone end in a wrong local minimum: attitudes that nothing measured have many. With
+    the coefficients of a throw that fits, the releases of the others are found. With a gyro alone,
+    wrong minima fit nearly as well, and a search begins from the coefficients of each throw.
+    """
+    rough = replace(problem, margin=ROUGH)
+    n = problem.shared
+    ends: list[tuple[float, int, tuple[Throw, ...], FloatArray]] = []
+    for shared in (x[:n], *(alone.shared for alone in good)):
+        tried = problem.means.copy()
+        tried[:n] = shared
+        around, tried, _ = retry_releases(rough, tried, range(len(problem.throws)))
+        solution = solve(around, tried, most_steps=_START_STEPS)
+        ends.append((solution.cost, len(ends), around.throws, solution.x))
+    _, _, throws, best = min(ends, key=lambda entry: entry[:2])
+    return replace(problem, throws=throws), best
 
 
 @dataclass(frozen=True)

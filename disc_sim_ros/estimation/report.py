@@ -71,6 +71,11 @@ def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
             lines.append(line)
     for gauge in sorted({gauge for throw in problem.throws for gauge in throw.gauges}):
         lines.append(f'  {gauge}')
+    if all(throw.turns_only for throw in problem.throws):
+        lines.append(
+            '  a gyro alone: another solution may fit nearly as well, far outside the errors; '
+            'measure a path, an attitude or a release too'
+        )
     lines.append(f'  {verdict(result, left_out)}')
     return '\n'.join(lines)
 

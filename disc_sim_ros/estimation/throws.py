@@ -72,16 +72,26 @@ class Throw:
         """Return the places in `times` of the sample times of each instrument."""
         return [np.searchsorted(self.times, o.sample_times) for o in self.observations]
 
+    @cached_property
+    def guess(self) -> FloatArray:
+        """Return the first state that is believed before a fit, shape (14,)."""
+        state = local.moved(self.start, self.believed[: local.SIZE])
+        state[13] += self.believed[local.SIZE]
+        return state
+
+    @property
+    def turns_only(self) -> bool:
+        """Return True if only the turning was measured: no path, attitude or release."""
+        return not (self.has_release or any(map(self.has, (POSITION, CAMERA, ATTITUDE))))
+
     def has(self, kind: str) -> bool:
         """Return True if an instrument of this kind measured it."""
         return any(o.kind == kind for o in self.observations)
 
     def starting_at(self, start: FloatArray) -> 'Throw':
         """Return the throw with changes counted from another state; the belief stays the same."""
-        before = local.moved(self.start, self.believed[: local.SIZE])
-        before[13] += self.believed[local.SIZE]
         start = np.asarray(start, dtype=float)
-        delta, turn = local.difference(start, before)
+        delta, turn = local.difference(start, self.guess)
         return replace(self, start=start, believed=np.array([*delta, turn]))
 
 
