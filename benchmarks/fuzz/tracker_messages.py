@@ -36,6 +36,7 @@ _PERIOD = 20_000_000  # ns
 
 def seeds() -> list[bytes]:
     """Return a valid message of each type, each after a byte that names its type."""
+    Predictor(_CONFIGS[0].predictor).warm_up()  # compilation is no hang of an input
     plain = []
     for number, kind in enumerate(_TYPES.values()):
         message = kind()
