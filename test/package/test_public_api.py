@@ -43,6 +43,20 @@ def test_a_name_of_flights_or_bags_loads_no_heavy_package(name):
     assert loaded_by(f'from disc_sim_ros import {name}') & HEAVY == set()
 
 
+FLIGHTS = """
+from disc_sim_ros import FlightSimulator, Launch, Setup, fly, fly_many, load_disc
+setup = Setup(disc=load_disc('frisbee'))
+fly(Launch(), setup)
+fly_many({'pitch': [1.0, 2.0]}, setup)
+FlightSimulator(setup, Launch().state()).advance(10)
+"""
+
+
+def test_flights_load_no_heavy_package_where_their_machine_code_is_on_disk():
+    loaded_by(FLIGHTS)  # compiles what is not there
+    assert loaded_by(FLIGHTS) & HEAVY == set()
+
+
 def test_a_heavy_import_is_noticed():
     """Studies draw from scipy's distributions; plots need matplotlib."""
     assert 'scipy' in loaded_by('from disc_sim_ros import Study') & HEAVY

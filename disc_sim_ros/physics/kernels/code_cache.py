@@ -115,9 +115,13 @@ class _CheckedCache(FunctionCache):  # type: ignore[misc]
     _impl_class = _CheckedCode
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function of a signature; None where it must be compiled."""
+        """Return the compiled function of a signature; None where it must be compiled.
+
+        The method of numba first loads all that a compilation needs, scipy too: half a second.
+        Machine code needs none of it, and a compilation loads it itself.
+        """
         try:
-            return super().load_overload(sig, target_context)
+            return self._load_overload(sig, target_context)
         except Exception as error:  # a damaged pickle can raise nearly anything
             _LOG.warning(
                 '%s: damaged machine code (%s: %s) is discarded, and compiled again in about 10 s',
