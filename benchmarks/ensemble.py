@@ -1,8 +1,9 @@
 """Measure ensembles: flights per second, errors, and time and memory over the number of flights.
 
 Flights are throws of the paper's Fig. 5 with some scatter in speed, pitch and spin, flown by
-`disc_sim_ros.physics.ensemble.fly_many`. They are compared with a loop of `flight.fly`, and with
-the same equations in plain numpy (benchmarks/numpy_flights.py). The error is that of the landing
+`disc_sim_ros.physics.ensemble.fly_many`. They are compared with a loop of `flight.fly`, with the
+same equations in plain numpy (benchmarks/numpy_flights.py), and, where g++ is, in plain C++
+(benchmarks/ensemble.cpp). The error is that of the landing
 point against an independent integration with a tolerance of 1e-12 (test/reference): of this throw,
 the largest of its neighbours, and the largest of three with a wobble or a faster spin, whose
 nutation needs shorter steps. Rates per CPU-second are of one thread. The last lines are for the
@@ -17,7 +18,9 @@ import os
 from pathlib import Path
 import platform
 import resource
+import shutil
 import sys
+import tempfile
 import time
 from typing import TYPE_CHECKING
 
@@ -31,6 +34,7 @@ from disc_sim_ros.physics.ensemble import fly_many
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.quantities import LAUNCH
+from ensemble_cpp import Ensemble
 from flights import ALLOWED, FIG_5, NEIGHBOURS, cpu_name, landing_of_reference, time_per_flight
 from lines import Line, number, print_lines
 import numpy_flights
@@ -46,6 +50,8 @@ NUMPY_COUNT = 2_000  # whose arrays stay in the cache: the best for it
 BATCH = 100_000
 ROUNDS = 3
 LEAST = 30_000  # flights a second on two cores
+MOST_CPP = 1.2  # times the CPU time of the C++ program
+SAME = 1e-9  # m, between the landings of both
 FLAT = 1.25  # times the memory of a tenth of the flights
 
 
@@ -90,6 +96,9 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
     print(f'plain numpy at {step * 1e3:g} ms: {plain:.0f} flights/CPU-s, Fig. 5 ending '
           f'{plain_error * 1e3:.3f} mm off; fly_many is {alone / plain:.1f} times as fast'
           )  # fmt: skip
+    cpp = cpp_rate(setup)
+    if cpp is not None:
+        print(f'plain C++ at {step * 1e3:g} ms: {cpp[0]:.0f} flights/CPU-s, fly_many {cpp[1]:.0f}')
     print(f' flights        s   flights/s   peak memory, MB   (in batches of {BATCH})')
     count = 1000
     while count <= largest:
@@ -113,6 +122,16 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
             ours=f'{number(alone)} flights per CPU-second',
             beside=f'the same equations in plain numpy {number(plain)}',
             ratio=alone / plain,
+        ),
+        Line(
+            what='ensemble, one thread',
+            ours=f'{number(alone if cpp is None else cpp[1])} flights per CPU-second',
+            beside='plain C++: no g++, not measured'
+            if cpp is None
+            else f'plain C++ with vectors of 8, the same landings {number(cpp[0])}',
+            ratio=None if cpp is None else cpp[1] / cpp[0],
+            bound=f'at least 1/{MOST_CPP:g} of it',
+            kept=None if cpp is None else MOST_CPP * cpp[1] >= cpp[0],
         ),
         Line(
             what=f'ensemble, {cores} cores',
@@ -163,6 +182,35 @@ def rates(setup: Setup, count: int) -> tuple[float, float]:
         fly_many(thrown, setup)
         wall = min(wall, time.perf_counter() - start)
     return count / cpu, count / wall
+
+
+def cpp_rate(setup: Setup) -> tuple[float, float] | None:
+    """Return flights per CPU-second of the C++ program and of `fly_many`; None without g++.
+
+    Raises:
+        AssertionError: They do not land at the same points.
+    """
+    if not shutil.which('g++'):
+        return None
+    thrown = scattered(COUNT, 1)
+    rows = zip(*thrown.values(), strict=True)
+    states = np.array(
+        [Launch(**dict(zip(thrown, map(float, row), strict=True))).state() for row in rows]
+    )
+    theirs = ours = math.inf
+    with tempfile.TemporaryDirectory() as folder:
+        program = Ensemble(Path(folder), setup)
+        for _ in range(ROUNDS):
+            start = time.process_time()
+            ends = program.fly(states)
+            theirs = min(theirs, time.process_time() - start)
+            start = time.process_time()
+            landings = fly_many(thrown, setup, threads=1)
+            ours = min(ours, time.process_time() - start)
+    apart = max(abs(landings.x - ends[:, 0]).max(), abs(landings.y + ends[:, 1]).max())
+    if not apart <= SAME:
+        raise AssertionError(f'fly_many and the C++ program land {apart:.3g} m apart')
+    return COUNT / theirs, COUNT / ours
 
 
 def numpy_rate(setup: Setup, references: list[list[float]]) -> tuple[float, float]:
