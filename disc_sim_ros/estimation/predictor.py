@@ -18,6 +18,7 @@ from disc_sim_ros.physics.kernels.rows import AT
 from disc_sim_ros.physics.kernels.sampling import sample_simd
 from disc_sim_ros.physics.kernels.tracking import track_simd
 from disc_sim_ros.physics.sampled import fly_sampled
+from disc_sim_ros.quantities import POSITION, PREDICTION
 
 MOST_MEASUREMENTS = 600  # of one throw; of more, every second of the older half is left out
 STEP = 0.02  # s; without nutation within 26 mm, 0.2 mm in the median (docs/predictor.md)
@@ -84,14 +85,14 @@ class Measurement:
     position_sigma: float | None = None
 
     def __post_init__(self) -> None:
-        for name, values in (('time', (self.time,)), ('position', self.position)):
-            if not all(map(math.isfinite, values)):
-                raise ConfigError(f'measured {name}', values, 'give finite numbers')
+        if not math.isfinite(self.time):
+            raise ConfigError('measured time', self.time, 'give a finite number')
+        for name, value in zip('xyz', self.position, strict=True):
+            POSITION.check(value, f'measured {name}')
         if self.axis is not None and not (math.isfinite(n := math.hypot(*self.axis)) and n > 0.0):
             raise ConfigError('measured axis', self.axis, 'give a finite direction')
-        sigma = self.position_sigma
-        if sigma is not None and not (math.isfinite(sigma) and sigma > 0.0):
-            raise ConfigError('measured position_sigma', sigma, 'give a number above 0')
+        if self.position_sigma is not None:
+            PREDICTION['position_sigma'].check(self.position_sigma, 'measured position_sigma')
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

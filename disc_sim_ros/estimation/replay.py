@@ -12,6 +12,7 @@ from disc_sim_ros.estimation import throw_csv
 from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
 from disc_sim_ros.physics.frames import flip, paper_from_map, paper_quaternion, rotation_matrix
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
+from disc_sim_ros.quantities import POSITION
 
 ELLIPSE_PERIOD = 0.05  # s of measurements between two ellipses
 _SHORTEST_QUATERNION = 1e-6
@@ -119,7 +120,9 @@ def fitted_flight(throw: FollowedThrow, config: PredictorConfig, rate: float) ->
 def measurements(
     time: FloatArray, position: FloatArray, quaternion: FloatArray | None = None
 ) -> list[Measurement]:
-    """Return measurements from columns, in `map`; rows that are not finite are left out.
+    """Return measurements from columns, in `map`.
+
+    Rows that are not finite, or beyond the range of `quantities.POSITION`, are left out.
 
     Args:
         time: By any clock [s], shape (n,).
@@ -132,7 +135,7 @@ def measurements(
     return [
         Measurement(float(t), (float(x), float(y), float(z)), axis)
         for t, (x, y, z), axis in zip(time, position, axes, strict=True)
-        if np.isfinite([t, x, y, z]).all()
+        if np.isfinite(t) and (np.abs([x, y, z]) <= POSITION.highest).all()
     ]
 
 
@@ -160,6 +163,10 @@ def _of_columns(path: Path, columns: throw_csv.Columns) -> list[Measurement]:
         needed = ', '.join((throw_csv.TIME, *throw_csv.GROUPS['position']))
         raise ConfigError('FILE', f'{path}: {", ".join(columns) or "nothing"}', f'give {needed}')
     time, position = columns['position']
+    far = float(np.abs(position).max())
+    if far > POSITION.highest:
+        allowed = f'{POSITION.allowed}; are the positions in m?'
+        raise ConfigError('FILE', f'{path}: {far:g}', allowed)
     quaternion = None
     if 'attitude' in columns:
         quaternion = np.zeros((len(time), 4))

@@ -31,6 +31,7 @@ GROUPS = {
 }
 CAMERA_COLUMNS = ('x_m', 'y_m')
 _MOST_ROWS = 1_000_000
+_LARGEST = 1e100  # larger numbers are none: their squares are infinite
 
 Columns = Mapping[str, tuple[FloatArray, FloatArray]]  # times (n,) and values (n, d) by instrument
 
@@ -112,13 +113,13 @@ def _instruments(thing: str, name: str, head: list[str]) -> dict[str, tuple[str,
 
 
 def _number(name: str, line: int, column: str, value: str) -> float:
-    """Return a finite number."""
+    """Return a finite number, whose square is finite too."""
+    where = f'{name}: line {line}: {column}'
     try:
         number = float(value)
     except ValueError:
         number = float('nan')
-    if not np.isfinite(number):
-        where = f'{name}: line {line}: {column}'
+    if not abs(number) < _LARGEST:
         raise ConfigError(where, value, 'give a finite number, or nothing')
     return number
 

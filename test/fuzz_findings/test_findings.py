@@ -21,6 +21,7 @@ from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
 from disc_sim_ros.estimation import replay, throw_csv
+from disc_sim_ros.estimation.predictor import Measurement
 from disc_sim_ros.physics import disc_file
 
 START = 1_700_000_000_000_000_000  # ns
@@ -257,3 +258,31 @@ def test_metadata_that_names_thousands_of_files_reads_each_file_that_is_there_on
         (message,) = open_bag(tmp_path / 'bag').raw()
         assert message.topic == '/a'
         assert len(looks) <= 2
+
+
+@pytest.mark.parametrize('far', [1e155, -1e308, math.inf, math.nan, 10_001.0])
+def test_a_measured_position_out_of_any_field_is_refused(far):
+    """Its square was no number: an OverflowError in the search for a throw."""
+    with pytest.raises(ConfigError, match=r'measured y: .* -10000 to 10000 m'):
+        Measurement(0.0, (1.0, far, 1.0))
+
+
+@pytest.mark.parametrize(
+    ('column', 'number', 'read'),
+    [
+        ('x_m', '1e155', throw_csv.read),
+        ('t_s', '1e200', throw_csv.read),
+        ('z_m', '-20000', replay.read_csv),
+    ],
+)
+def test_a_number_in_a_file_of_throws_that_is_none_of_a_throw_is_refused(
+    tmp_path, column, number, read
+):
+    cells = {'t_s': '0.1', 'x_m': '1', 'y_m': '0', 'z_m': '1', column: number}
+    file = tmp_path / 'throws.csv'
+    file.write_text(f'{",".join(cells)}\n{",".join(cells.values())}\n', encoding='utf-8')
+    with pytest.raises(
+        ConfigError, match=f'{number.strip("-")}.* (?:finite number|in m)'
+    ) as refused:
+        read(file)
+    assert '\n' not in str(refused.value)

@@ -8,11 +8,12 @@ from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation.predictor import Measurement
 from disc_sim_ros.physics.frames import earth_from_body
+from disc_sim_ros.quantities import PREDICTION
 from disc_sim_ros.ros.predictor.options import NodeConfig, is_plain
 from disc_sim_ros.units import NANOSECONDS
 
 _SHORTEST_QUATERNION = 1e-6
-_MOST_SIGMA = 10.0  # m, of a covariance that is used
+_SIGMA = PREDICTION['position_sigma']  # the range of a covariance that is used
 
 
 def stamp_of(message: Any) -> int:
@@ -68,4 +69,4 @@ def _axis(q: Any, config: NodeConfig) -> Vector | None:
 def _sigma(covariance: Any) -> float | None:
     """Return the standard deviation of a position; None where the message gives none."""
     mean = float(covariance[0] + covariance[7] + covariance[14]) / 3.0
-    return mean**0.5 if 0.0 < mean < _MOST_SIGMA**2 else None
+    return max(mean**0.5, _SIGMA.lowest) if 0.0 < mean < _SIGMA.highest**2 else None
