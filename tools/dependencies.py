@@ -55,7 +55,7 @@ WHY = {
     'hypothesis': 'property-based tests',
     'gymnasium': 'the interface of environments for reinforcement learning',
     'furo': 'theme of the documentation site; its files are local',
-    'llvmlite': 'SIMD instructions for numba, which depends on it',
+    'llvmlite': 'runs compiled equations; SIMD instructions for numba',
     'myst-parser': 'Markdown pages for Sphinx',
     'packaging': 'compares the lock file with the bounds',
     'import-linter': 'enforces the direction of imports',

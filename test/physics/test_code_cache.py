@@ -17,14 +17,13 @@ if 'full' in sys.argv:  # no file may grow beyond 1 kB: writing fails as on a fu
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 if 'upgraded' in sys.argv:
-    import numba
-    numba.__version__ = '99.0'
+    sys.version += ' and a patch'
 from disc_sim_ros.physics.kernels.code_cache import cache_folder
 from disc_sim_ros.physics.kernels.jit import entry
 @entry
 def triple(x):
     return 3.0 * x
-print(triple(2.0), sum(triple.stats.cache_hits.values()), cache_folder())
+print(triple(2.0), triple.hits, cache_folder())
 """
 
 
@@ -92,7 +91,7 @@ def test_first_starts_at_once_do_not_disturb_each_other(start, tmp_path):
     assert (number, hits, stderr) == ('6.0', '1', '')
 
 
-def test_another_numba_has_a_folder_of_its_own(start, tmp_path):
+def test_another_compiler_has_a_folder_of_its_own(start, tmp_path):
     place = {'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
     before, _ = result_of(start(**place))
     after, stderr = result_of(start('upgraded', **place))

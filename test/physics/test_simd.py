@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from disc_sim_ros.physics.kernels import simd
+from disc_sim_ros.physics.kernels import jit, simd
 from disc_sim_ros.physics.kernels.equations import arctangent
 from disc_sim_ros.physics.kernels.simd import (
     WIDTH,
@@ -21,7 +21,9 @@ from disc_sim_ros.physics.kernels.simd import (
     where,
 )
 
-compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason='SIMD is compiled only')
+compiled = pytest.mark.skipif(not jit.COMPILED, reason='SIMD is compiled only')
+if jit.COMPILED:
+    jit.import_compiler()
 SPECIAL = [0.0, -0.0, 1.0, -1.5, math.inf, -math.inf, math.nan, 1e-310]
 PAIRS = [(x, y) for x in SPECIAL for y in SPECIAL]
 BINARY = {

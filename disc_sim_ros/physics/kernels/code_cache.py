@@ -1,55 +1,116 @@
 """The cache of machine code on disk. What is read from it is checked first.
 
-numba keys its cache on the source file of the outermost function alone: after a change of the
-equations in another file it would fly the old ones. The cache therefore lives in a folder that is
-named after a digest of all sources in this folder. A change elsewhere keeps the machine code.
+Machine code of old equations must not fly. The cache therefore lives in a folder that is named
+after a digest of all sources in this folder and of what compiles them. A change elsewhere keeps
+the machine code, unless it is in the function itself or in a file that it names.
 
-numba reads its files with pickle. An empty or torn file, after a power cut or from a full disk,
-raises an error at every start; a changed byte could fly anything. Here the machine code carries a
-checksum, and what cannot be read or does not match is discarded and compiled again.
+After a power cut or on a full disk a file can be empty or torn. Each file therefore begins with a
+checksum, and what does not match is discarded and compiled again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 import hashlib
+import importlib.util
+import json
 import logging
 import os
 from pathlib import Path
-import pickle
 import shutil
 import sys
 import time
 from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]
-import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
-from numba.core.serialize import dumps
+import numpy as np
 
 _NEEDED = 20 << 20  # bytes of free space; the machine code is about 2 MB
 _KEEP_UNUSED_S = 30 * 86400.0  # caches of older sources are removed after a month without use
 _LOG = logging.getLogger(__name__)  # without handlers it writes the bare line to stderr
+_HERE = Path(__file__).parent
+_END = '.code'  # of the names of files
 
 
-def enable(dispatcher: Any, sources: Sequence[Path] = ()) -> None:
-    """Let a compiled function keep its machine code on disk, where there is a place for it.
+class Place:
+    """Where the machine code of one function is kept."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        """Take a folder, and the beginning of the names of the files of this function."""
+        self._folder, self._name = folder, name
+
+    def has_any(self) -> bool:
+        """Return True if there is machine code for any kind of arguments."""
+        return any(self._folder.glob(f'{self._name}-*{_END}'))
+
+    def _path(self, key: str) -> Path:
+        return self._folder / f'{self._name}-{_digest(key.encode())}{_END}'
+
+    def read(self, key: str) -> list[Any] | None:
+        """Return what was kept under a key, the description, then object files, or None."""
+        path = self._path(key)
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            self.discard(key, error)
+            return None
+        checksum, content = data[:32], data[32:]
+        if hashlib.sha256(content).digest() != checksum:
+            self.discard(key, ValueError('wrong checksum'))
+            return None
+        head, _, code = content.partition(b'\n')
+        description, *lengths = json.loads(head)
+        parts = []
+        for length in lengths:
+            parts.append(code[:length])
+            code = code[length:]
+        return [description, *parts]
+
+    def write(self, key: str, description: Sequence[Any], code: Sequence[bytes]) -> None:
+        """Keep a description and object files under a key, if the disk takes them."""
+        head = json.dumps([description, *map(len, code)]).encode()
+        content = b''.join([head, b'\n', *code])
+        path = self._path(key)
+        part = path.with_name(f'{path.name}.{os.getpid()}')
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            part.write_bytes(hashlib.sha256(content).digest() + content)
+            part.replace(path)  # whole, also for processes that start now
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            _LOG.warning('%s: cannot keep machine code: %s', path.parent, error)
+
+    def discard(self, key: str, error: Exception) -> None:
+        """Remove what is kept under a key, and say so."""
+        path = self._path(key)
+        _LOG.warning(
+            '%s: damaged machine code (%s: %s) is discarded, and compiled again in about 10 s',
+            path.parent, type(error).__name__, error,
+        )  # fmt: skip
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def place(function: Callable[..., Any], sources: Sequence[Path] = ()) -> Place | None:
+    """Return where the machine code of a function is kept, or None where it stays in memory.
 
     Args:
-        dispatcher: The function. numba itself notices changes of its file.
+        function: The function in plain Python.
         sources: Other files outside this folder whose functions it calls.
     """
     folder = cache_folder()
     if folder is None:
-        return  # it is compiled in memory
-    if sources:
-        digest = hashlib.sha256(b''.join(path.read_bytes() for path in sources))
-        folder /= digest.hexdigest()[:16]
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder)
-    try:
-        dispatcher._cache = _CheckedCache(dispatcher.py_func)  # noqa: SLF001 - as enable_caching()
-    finally:
-        numba.config.CACHE_DIR = before
+        return None
+    own = Path(function.__code__.co_filename)
+    files = [*sources] if own.parent == _HERE else [own, *sources]
+    if files:
+        try:
+            folder /= _digest(*(path.read_bytes() for path in files))
+        except OSError:  # it is in no file, as in an interactive session
+            return None
+    return Place(folder, f'{function.__module__.rpartition(".")[2]}.{function.__qualname__}')
 
 
 def cache_folder() -> Path | None:
@@ -77,63 +138,42 @@ def _remove_unused(base: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+def has_code() -> bool:
+    """Return True if these very sources and compilers have put machine code on disk before."""
+    folder = cache_folder()
+    return folder is not None and any(folder.rglob(f'*{_END}'))
+
+
 def source_digest(folder: Path) -> str:
     """Return a short digest of all Python sources in a folder, and of what compiles them."""
-    compilers = f'{numba.__version__} {llvmlite.__version__} {sys.version}'
-    digest = hashlib.sha256(compilers.encode())
-    for path in sorted(folder.glob('*.py')):
-        digest.update(path.read_bytes())
+    sources = (path.read_bytes() for path in sorted(folder.glob('*.py')))
+    return _digest(*_compilers(), *sources)
+
+
+def _compilers() -> list[bytes]:
+    """Return what tells the versions of the compilers, without an import of numba."""
+    versions = f'{llvmlite.__version__} {np.__version__} {sys.version}'
+    settings = sorted(f'{k}={v}' for k, v in os.environ.items() if k in _SETTINGS)
+    result = [versions.encode(), *map(str.encode, settings)]
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        spec = importlib.util.find_spec('numba')
+        if spec is not None and spec.origin:
+            origin = Path(spec.origin)
+            for path in (origin, origin.with_name('_version.py')):
+                result += [path.read_bytes()] if path.is_file() else []
+    return result
+
+
+# Settings of numba that change the machine code.
+_SETTINGS = {'NUMBA_OPT', 'NUMBA_CPU_NAME', 'NUMBA_CPU_FEATURES', 'NUMBA_ENABLE_AVX',
+             'NUMBA_LOOP_VECTORIZE', 'NUMBA_SLP_VECTORIZE', 'NUMBA_BOUNDSCHECK'}  # fmt: skip
+
+
+def _digest(*parts: bytes) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
     return digest.hexdigest()[:16]
 
 
-SOURCE_DIGEST = source_digest(Path(__file__).parent)
-
-
-class _CheckedCode(CompileResultCacheImpl):  # type: ignore[misc]
-    """Machine code as numba stores it, with a checksum of its bytes."""
-
-    def reduce(self, cres: Any) -> tuple[bytes, bytes]:
-        """Return the checksum and the bytes of a compiled function."""
-        code = dumps(super().reduce(cres))
-        return hashlib.sha256(code).digest(), code
-
-    def rebuild(self, target_context: Any, payload: tuple[bytes, bytes]) -> Any:
-        """Return the compiled function of what `reduce` returned.
-
-        Raises:
-            ValueError: The bytes do not match their checksum.
-        """
-        checksum, code = payload
-        if hashlib.sha256(code).digest() != checksum:
-            raise ValueError('wrong checksum')
-        return super().rebuild(target_context, pickle.loads(code))  # noqa: S301 - checked
-
-
-class _CheckedCache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one function, which never raises: damage and full disks cost time only."""
-
-    _impl_class = _CheckedCode
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function of a signature; None where it must be compiled.
-
-        The method of numba first loads all that a compilation needs, scipy too: half a second.
-        Machine code needs none of it, and a compilation loads it itself.
-        """
-        try:
-            return self._load_overload(sig, target_context)
-        except Exception as error:  # a damaged pickle can raise nearly anything
-            _LOG.warning(
-                '%s: damaged machine code (%s: %s) is discarded, and compiled again in about 10 s',
-                self.cache_path, type(error).__name__, error,
-            )  # fmt: skip
-            with contextlib.suppress(OSError):
-                self.flush()
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function of a signature, if the disk takes it."""
-        try:
-            super().save_overload(sig, data)
-        except Exception as error:  # a full disk, or an index that is damaged once more
-            _LOG.warning('%s: cannot keep machine code: %s', self.cache_path, error)
+SOURCE_DIGEST = source_digest(_HERE)

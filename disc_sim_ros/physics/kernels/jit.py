@@ -1,7 +1,9 @@
-"""The one door to numba: every compiled function is compiled by a decorator of this module.
+"""The one door to the compiler: every compiled function is marked by a decorator of this module.
 
-(`simd_numba` tells numba how to compile SIMD vectors, and `native` calls of C functions;
-`code_cache` keeps machine code on disk.)
+A warm start runs the machine code of `machine_code` and imports no compiler. `compiler` imports
+numba, and lets it compile what is marked here, where machine code is missing; `simd_numba` tells
+numba how to compile SIMD vectors, and `native_numba` calls of C functions. `code_cache` keeps
+machine code on disk.
 
 Without numba, or with NUMBA_DISABLE_JIT=1, each decorator returns the plain Python function: the
 same equations, some hundred times slower.
@@ -10,19 +12,30 @@ same equations, some hundred times slower.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
+import os
 from pathlib import Path
 import sys
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 
+class Mark(NamedTuple):
+    """A function that compiled functions may call."""
+
+    function: Callable[..., Any]
+    inline: bool  # it is compiled into each caller
+    of_tuple: Callable[..., Any] | None = None  # what it is if its last argument is a tuple ...
+    otherwise: Callable[..., Any] | None = None  # ... or an array, if that makes a difference
+
+
+MARKED: list[Mark] = []
+NUMBA_ERROR = ''  # why numba cannot be used; '' where it can, or is switched off
+
+
 @contextmanager
 def _without_scipy() -> Iterator[None]:
-    """Let the block import numba, which imports scipy only to check its version, without scipy.
-
-    `from disc_sim_ros import fly` then does not import scipy, which flights do not need.
-    """
+    """Let the block import numba, which imports scipy only to check its version, without scipy."""
     if 'scipy' in sys.modules:
         yield
         return
@@ -33,31 +46,45 @@ def _without_scipy() -> Iterator[None]:
         del sys.modules['scipy']
 
 
-COMPILED = False
-NUMBA_ERROR = ''  # why numba cannot be used; '' where it can, or is switched off
-try:
+def import_compiler() -> None:
+    """Import numba and tell it what is marked, for functions that numba.njit compiles.
+
+    Raises:
+        Exception: numba is missing, or does not fit this numpy: that can raise anything.
+    """
     with _without_scipy():
-        import numba
-        import numba.extending
+        import numba  # noqa: F401, PLC0415 - it takes longer than all the rest of a start
+    from disc_sim_ros.physics.kernels import compiler  # noqa: PLC0415
 
-    if not numba.config.DISABLE_JIT:
-        from disc_sim_ros.physics.kernels import code_cache, simd_numba  # noqa: F401
+    compiler.learn()
 
-        COMPILED = True
-except Exception as error:  # it is missing, or does not fit this numpy: that can raise anything
-    NUMBA_ERROR = f'{type(error).__name__}: {error}'
+
+def _can_compile() -> bool:
+    """Return True if functions are compiled; where machine code is at hand, numba can do it."""
+    global NUMBA_ERROR  # noqa: PLW0603 - this is its definition
+    if os.environ.get('NUMBA_DISABLE_JIT', '0') not in {'', '0'}:
+        return False
+    try:
+        from disc_sim_ros.physics.kernels import code_cache, machine_code  # noqa: F401, PLC0415
+
+        if 'numba' in sys.modules or not code_cache.has_code():
+            with _without_scipy():
+                import numba  # noqa: PLC0415
+
+            return not numba.config.DISABLE_JIT
+    except Exception as error:
+        NUMBA_ERROR = f'{type(error).__name__}: {error}'
+        return False
+    return True
+
 
 F = TypeVar('F', bound=Callable[..., Any])
-
-# Compiled functions work in the arrays of their caller: they allocate none, and count no
-# references. Counting them, at each use of a table, would take a third of the time of a flight.
-_OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'nogil': True, '_nrt': False}
+COMPILED = _can_compile()
 
 
 def inline(function: F) -> F:
     """Compile a function into each compiled function that calls it; Python calls it as it is."""
-    if COMPILED:
-        numba.extending.register_jitable(forceinline=True, **_OPTIONS)(function)
+    MARKED.append(Mark(function, inline=True))
     return function
 
 
@@ -72,19 +99,14 @@ def by_type(of_tuple: F, otherwise: F) -> F:
     def chosen(*arguments: Any) -> Any:
         return (of_tuple if isinstance(arguments[-1], tuple) else otherwise)(*arguments)
 
-    if COMPILED:
-        options = {'forceinline': True, **_OPTIONS}
-
-        @numba.extending.overload(chosen, jit_options=options, strict=False)  # type: ignore[untyped-decorator]
-        def choose(*kinds: Any) -> Any:
-            return of_tuple if isinstance(kinds[-1], numba.types.BaseTuple) else otherwise
-
+    MARKED.append(Mark(chosen, True, of_tuple, otherwise))  # noqa: FBT003
     return _typed(chosen, of_tuple)
 
 
 def jit(function: F) -> F:
-    """Compile a function that compiled functions call."""
-    return _typed(numba.njit(**_OPTIONS)(function), function) if COMPILED else function
+    """Compile a function, which compiled functions then call; Python calls it as it is."""
+    MARKED.append(Mark(function, inline=False))
+    return function
 
 
 def entry(function: F) -> F:
@@ -102,9 +124,9 @@ def entry_with(*sources: Path) -> Callable[[F], F]:
     def compile_entry(function: F) -> F:
         if not COMPILED:
             return _silent(function)
-        compiled = numba.njit(**_OPTIONS)(function)
-        code_cache.enable(compiled, sources)
-        return _typed(compiled, function)
+        from disc_sim_ros.physics.kernels.machine_code import CompiledFunction  # noqa: PLC0415
+
+        return _typed(CompiledFunction(function, sources), function)
 
     return compile_entry
 
@@ -126,12 +148,7 @@ def is_compiled(function: Callable[..., Any]) -> bool:
     That is so in plain Python, after this process has compiled it, and if its machine code is on
     disk.
     """
-    if not COMPILED or not isinstance(function, numba.core.dispatcher.Dispatcher):
-        return True
-    folder = function.stats.cache_path
-    name = function.py_func.__name__
-    on_disk = folder is not None and any(Path(folder).glob(f'*.{name}-*.nbc'))
-    return on_disk or bool(function.signatures)
+    return bool(getattr(function, 'is_compiled', True))
 
 
 def note_before(*functions: Callable[..., Any], seconds: int) -> str:

@@ -436,6 +436,7 @@ def test_an_address_of_another_handle_is_refused(world):
 
 def test_compiled_numbers_of_messages_have_the_bits_of_python():
     numba = pytest.importorskip('numba')
+    jit.import_compiler()
 
     @numba.njit(error_model='numpy')
     def compiled(s):
