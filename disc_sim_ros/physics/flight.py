@@ -1,8 +1,9 @@
 """One flight from release to landing, without ROS: `fly`, which every offline tool uses."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 import math
+import threading
 from typing import Any
 
 import numpy as np
@@ -156,6 +157,11 @@ class Setup:
             raise ConfigError(STEP.name, self.step, allowed, STEP.name)
 
     @cached_property
+    def calm_inputs(self) -> Inputs:
+        """Return the inputs of the compiled equations without gusts and control inputs."""
+        return Inputs(NO_CONTROL, self.wind_data, NO_NOISE)
+
+    @cached_property
     def wind_data(self) -> WindData:
         """Return the wind in the form of the compiled equations."""
         wind = self.wind
@@ -267,13 +273,15 @@ def fly(
         IntegrationError: The disc turned or moved faster than the step can follow.
     """
     rows = check_flight(launch, setup, duration, ground=ground, sample_rate=sample_rate)
-    samples = np.empty((rows, COLUMNS))
-    inputs = Inputs(checked_control(control), setup.wind_data, setup.noise(duration))
-    options = Options(setup.fixed_step, float(duration), ground, float(sample_rate))
+    samples = np.empty((rows, COLUMNS)) if rows else _NO_SAMPLES
+    if control is NO_CONTROL and setup.wind.turbulence == 0.0:
+        inputs = setup.calm_inputs
+    else:
+        inputs = Inputs(checked_control(control), setup.wind_data, setup.noise(duration))
+    options = _options(setup.fixed_step, float(duration), ground, float(sample_rate))
     if setup.step is None:
-        space = np.empty(adaptive.SPACE)
         result = adaptive.integrate_adaptive(
-            launch.state(), setup.corner_plant, inputs, options, samples, space
+            launch.state(), setup.corner_plant, inputs, options, samples, _of_thread.space
         )
     else:
         result = integrator.integrate(launch.state(), setup.plant, inputs, options, samples)
@@ -289,6 +297,24 @@ def fly(
         apex=frames.flip(result.apex_Z),
         trajectory=Trajectory(samples[: result.samples], setup.disc.diameter),
     )
+
+
+@lru_cache(
+    maxsize=64, typed=True
+)  # the same object again need not be written again, see `machine_code`
+def _options(step: float, duration: float, ground: bool, sample_rate: float) -> Options:
+    return Options(step, duration, ground, sample_rate)
+
+
+class _OfThread(threading.local):
+    """Memory that compiled code works in; each thread has its own."""
+
+    def __init__(self) -> None:
+        self.space = np.empty(adaptive.SPACE)
+
+
+_of_thread = _OfThread()
+_NO_SAMPLES = np.empty((0, COLUMNS))
 
 
 def check_flight(

@@ -3,8 +3,10 @@
 What `jit` has marked so far is told to numba by `learn`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
+import gc
 from typing import Any
 
 from llvmlite import binding, ir  # type: ignore[import-untyped]
@@ -68,7 +70,8 @@ def compile_entry(
     learn()
     dispatcher = _dispatcher(function)
     kinds = tuple(map(numba.typeof, arguments))
-    dispatcher.compile(kinds)
+    with _without_garbage_collection():
+        dispatcher.compile(kinds)
     compiled = dispatcher.overloads[kinds]
     library = compiled.library
     _, _, (code, _) = library.serialize_using_object_code()
@@ -83,6 +86,18 @@ def compile_entry(
         code,
         _caller(symbol, compiled, dispatcher.targetdescr.target_context, kinds),
     )
+
+
+@contextmanager
+def _without_garbage_collection() -> Iterator[None]:
+    """Let numba make its many small objects without looking for cycles: a twelfth of the time."""
+    on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if on:
+            gc.enable()
 
 
 def _result_kind(kind: Any) -> Any:

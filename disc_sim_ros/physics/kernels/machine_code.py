@@ -119,6 +119,7 @@ class MachineCode:
         address = self._engine.get_function_address(about.symbol)
         self.run = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)(address)
         self.kinds = kinds
+        self.have_arrays = list(map(_has_arrays, kinds))
         self.arguments = [struct.Struct(f'={slot_format(kind)}') for kind in kinds]
         sizes = [form.size for form in self.arguments]
         self.places = [sum(sizes[:i]) for i in range(len(sizes) + 1)]  # the last of the result
@@ -165,7 +166,8 @@ class _Call:
                 if flatten(argument, slots) != code.kinds[i]:
                     return _OTHER_KIND
                 code.arguments[i].pack_into(memory, code.places[i], *slots)
-                last[i] = argument if _is_small(argument, code.kinds[i]) else _NOTHING
+                keep = not code.have_arrays[i] or _memory(argument) <= _SMALL
+                last[i] = argument if keep else _NOTHING
             i += 1
         if i != len(last):
             return _OTHER_KIND
@@ -179,13 +181,17 @@ _OTHER_KIND = object()
 _SMALL = 1 << 16  # bytes of the arrays that a call keeps until the next
 
 
-def _is_small(value: Any, kind: Kind) -> bool:
-    """Return True if a call may keep an argument until the next."""
+def _has_arrays(kind: Kind) -> bool:
     if isinstance(kind, str):
-        return True
-    if isinstance(kind[0], type):
-        return all(map(_is_small, value, kind[1]))
-    return bool(value.nbytes <= _SMALL)
+        return False
+    return any(map(_has_arrays, kind[1])) if isinstance(kind[0], type) else True
+
+
+def _memory(value: Any) -> int:
+    """Return the memory of the arrays in an argument [bytes]."""
+    if isinstance(value, tuple):
+        return sum([_memory(part) for part in value if isinstance(part, tuple | np.ndarray)])
+    return int(value.nbytes)
 
 
 @cache
