@@ -144,6 +144,23 @@ def test_a_function_that_this_machine_lacks_costs_a_compilation(tmp_path, monkey
     assert file.is_file()
 
 
+def test_a_numba_with_other_parts_compiles_in_memory(tmp_path, monkeypatch, caplog):
+    """Machine code is taken from parts of numba that it does not promise to keep."""
+
+    def changed(*_):
+        raise AttributeError('no such part')
+
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    jit.import_compiler()
+    monkeypatch.setattr('disc_sim_ros.physics.kernels.compiler.compile_entry', changed)
+    tripled = jit.entry(triple)
+    assert [tripled(2.0), tripled(3.0)] == [6.0, 9.0]
+    assert caplog.messages == [
+        'triple: numba compiles it in memory (AttributeError: no such part)'
+    ]
+    assert not list(tmp_path.rglob('*.code'))
+
+
 def triple(x):
     return 3.0 * x
 

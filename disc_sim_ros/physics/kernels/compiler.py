@@ -100,6 +100,13 @@ def _without_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
+def in_memory(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function as numba itself compiles and calls it, without `machine_code`."""
+    learn()
+    compiled: Callable[..., Any] = numba.njit(**_OPTIONS)(function)
+    return compiled
+
+
 def _result_kind(kind: Any) -> Any:
     if kind in _LEAVES:
         return _LEAVES[kind]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import ctypes
 from functools import cache, update_wrapper
 import importlib
+import logging
 import operator
 from pathlib import Path
 import struct
@@ -24,6 +25,7 @@ from disc_sim_ros.physics.kernels import code_cache
 # int, '?' for a bool, (class, kinds) for a tuple, and (type, dimensions, layout, read-only) for an
 # array.
 Kind = Any
+_LOG = logging.getLogger(__name__)  # without handlers it writes the bare line to stderr
 SLOT = 8  # bytes
 _LEAVES: dict[type, str] = {
     float: 'd',
@@ -256,6 +258,7 @@ class CompiledFunction:
         self._sources = sources
         self._versions: dict[tuple[Kind, ...], MachineCode] = {}
         self._latest: MachineCode | None = None  # the version that was called last
+        self._otherwise: Callable[..., Any] | None = None  # what runs where this cannot be done
         self._lock = threading.Lock()
 
     def __call__(self, *arguments: Any) -> Any:
@@ -265,9 +268,18 @@ class CompiledFunction:
         if result is _OTHER_KIND:
             kinds = tuple([flatten(argument, []) for argument in arguments])
             code = self._versions.get(kinds) or self._load(kinds, arguments)
+            if code is None:
+                return self._in_memory(arguments)
             self._latest = code
             result = code(arguments)
         return result
+
+    def _in_memory(self, arguments: tuple[Any, ...]) -> Any:
+        if self._otherwise is None:
+            from disc_sim_ros.physics.kernels import compiler  # noqa: PLC0415 - numba is slow
+
+            self._otherwise = compiler.in_memory(self.function)
+        return self._otherwise(*arguments)
 
     @property
     def is_compiled(self) -> bool:
@@ -275,7 +287,10 @@ class CompiledFunction:
         place = code_cache.place(self.function, self._sources)
         return bool(self._versions) or (place is not None and place.has_any())
 
-    def _load(self, kinds: tuple[Kind, ...], arguments: tuple[Any, ...]) -> MachineCode:
+    def _load(self, kinds: tuple[Kind, ...], arguments: tuple[Any, ...]) -> MachineCode | None:
+        """Return the version for some kinds; None where this numba must call it itself."""
+        if self._otherwise is not None:
+            return None
         with self._lock:
             if kinds in self._versions:
                 return self._versions[kinds]
@@ -293,7 +308,14 @@ class CompiledFunction:
             if version is None:
                 from disc_sim_ros.physics.kernels import compiler  # noqa: PLC0415 - numba is slow
 
-                description, *code = compiler.compile_entry(self.function, arguments)
+                try:
+                    description, *code = compiler.compile_entry(self.function, arguments)
+                except Exception as error:  # it uses parts of numba that are not promised
+                    _LOG.warning(
+                        '%s: numba compiles it in memory (%s: %s)',
+                        self.function.__name__, type(error).__name__, error,
+                    )  # fmt: skip
+                    return None
                 if place is not None:
                     place.write(key, description, code)
                 version = MachineCode(kinds, description, code)
