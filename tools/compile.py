@@ -1,7 +1,7 @@
 """Compile the equations of motion into the cache, so that parallel tests need not."""
 
 from concurrent.futures import ProcessPoolExecutor, wait
-from dataclasses import replace
+from dataclasses import astuple, replace
 import importlib.util
 import multiprocessing
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from disc_sim_ros.estimation.predictor import Predictor, PredictorConfig
 from disc_sim_ros.physics import disc_file, flight, simulator
+from disc_sim_ros.physics.batch_simulator import BatchSimulator
 from disc_sim_ros.physics.ensemble import fly_many
+from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.sampled import default_row, fly_sampled
 
@@ -37,6 +39,23 @@ def compile_ensembles() -> None:
     fly_many({}, replace(SETUP, step=0.02), duration=0.01, ground=False)
 
 
+def compile_gusty_ensembles() -> None:
+    """Compile the loops over many flights that fly one after the other, in gusts."""
+    gusty = replace(SETUP, wind=Wind(turbulence=5.0))
+    fly_many({}, gusty, duration=0.01, ground=False)
+    fly_many({}, replace(gusty, step=0.02), duration=0.01, ground=False)
+
+
+def compile_batches() -> None:
+    """Compile the loops over many flights that are steered."""
+    batch = BatchSimulator(replace(SETUP, step=0.005), 1)
+    calm = np.zeros((1, 3))
+    batch.release([0], [list(astuple(Launch()))], calm)
+    batch.place([0], np.array(Launch().state())[:, np.newaxis], calm)
+    batch.advance(1)
+    batch.close()
+
+
 def compile_the_estimators() -> None:
     """Compile what predictions and fits fly and compare."""
     states = np.array(Launch().state())[np.newaxis]
@@ -53,6 +72,8 @@ if __name__ == '__main__':
                 pool.submit(compile_the_simulator),
                 pool.submit(compile_ensembles),
                 pool.submit(compile_the_estimators),
+                pool.submit(compile_gusty_ensembles),
+                pool.submit(compile_batches),
             ]
         ).done:
             future.result()

@@ -1,5 +1,7 @@
 """Paths on command lines: the home folder, stdout, endings in capitals."""
 
+import os
+from pathlib import Path
 import shutil
 import subprocess
 import sys
@@ -12,6 +14,8 @@ from disc_sim_ros.physics import disc_file
 
 @pytest.fixture
 def home(tmp_path, monkeypatch):
+    if 'XDG_CACHE_HOME' not in os.environ:  # with another home, machine code is compiled again
+        monkeypatch.setenv('XDG_CACHE_HOME', str(Path.home() / '.cache'))
     monkeypatch.setenv('HOME', str(tmp_path))
     return tmp_path
 
