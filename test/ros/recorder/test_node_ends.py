@@ -161,7 +161,8 @@ def test_a_simulator_that_ends_delivers_its_last_messages(ros, record):
     ends = {}
     for message in bag.raw(kept):
         ends[message.topic] = message.publish_time
-    assert max(ends.values()) - min(ends.values()) < 1_000_000, 'all end with the same step'
+    # Steps are 10 ms apart; a machine under load may need milliseconds for the topics of one.
+    assert max(ends.values()) - min(ends.values()) < 5_000_000, 'all end with the same step'
 
 
 def test_the_last_messages_of_1200_topics_are_kept(ros, record):
