@@ -35,7 +35,15 @@ from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.quantities import LAUNCH
 from ensemble_cpp import Ensemble
-from flights import ALLOWED, FIG_5, NEIGHBOURS, cpu_name, landing_of_reference, time_per_flight
+from flights import (
+    ALLOWED,
+    CONTROLLED,
+    FIG_5,
+    NEIGHBOURS,
+    cpu_name,
+    landing_of_reference,
+    time_per_flight,
+)
 from lines import Line, number, print_lines
 import numpy_flights
 
@@ -92,6 +100,13 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
             best = (step, near, one, alone, together)
     step, near, one, alone, together = best
     setup = Setup(disc=disc, step=step)
+    controlled = Setup(disc=disc)
+    controlled_error = max(landing_errors(controlled, references))
+    controlled_one = 1.0 / time_per_flight(controlled, ROUNDS)
+    controlled_alone, controlled_together = rates(controlled, COUNT // 8)
+    print(f' control {controlled_error * 1e3:27.5f} {controlled_one:12.0f} '
+          f'{controlled_alone:9.0f} {controlled_alone / controlled_one:8.1f} '
+          f'{controlled_together:12.0f}')  # fmt: skip
     plain, plain_error = numpy_rate(setup, references)
     print(f'plain numpy at {step * 1e3:g} ms: {plain:.0f} flights/CPU-s, Fig. 5 ending '
           f'{plain_error * 1e3:.3f} mm off; fly_many is {alone / plain:.1f} times as fast'
@@ -132,6 +147,15 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
             ratio=None if cpp is None else cpp[1] / cpp[0],
             bound=f'at least 1/{MOST_CPP:g} of it',
             kept=None if cpp is None else MOST_CPP * cpp[1] >= cpp[0],
+        ),
+        Line(
+            what='ensemble by default, with error control, one thread',
+            ours=f'{number(controlled_alone)} flights per CPU-second, '
+            f'{number(controlled_error * 1e3, 1)} mm off at most',
+            beside=f'a loop of `fly` {number(controlled_one)}',
+            ratio=controlled_alone / controlled_one,
+            bound=f'less than {CONTROLLED * 1e3:g} mm off',
+            kept=controlled_error < CONTROLLED,
         ),
         Line(
             what=f'ensemble, {cores} cores',

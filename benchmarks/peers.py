@@ -19,6 +19,7 @@ from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
 from lines import Line, number, print_lines
 
+LEAST = 80.0  # times the rate of FrisPy
 SPEED, SPIN, HEIGHT, SECONDS = 15.0, 31.416, 50.0, 3.0  # m/s, rad/s, m, s
 Point = tuple[float, float, float]
 
@@ -33,8 +34,8 @@ def rate(flight: Callable[[], Point], seconds: float) -> float:
     return count / (time.process_time() - start)
 
 
-def ours(step: float, **inertia: float) -> Callable[[], Point]:
-    """Return a flight of this package."""
+def ours(step: float | None, **inertia: float) -> Callable[[], Point]:
+    """Return a flight of this package, with error control where no step is given."""
     document = disc_file.disc_document(disc_file.load_disc('frisbee_as_printed')) | inertia
     setup = Setup(disc=disc_file.disc_from_document('frisbee_as_printed', document), step=step)
     launch = Launch(speed=SPEED, spin=SPIN, height=HEIGHT)
@@ -81,6 +82,9 @@ def lines(seconds: float = 3.0) -> tuple[Line, ...]:
     """Measure each simulator for some CPU seconds."""
     mine = rate(ours(0.02), seconds)
     error = math.dist(ours(0.02)(), ours(1e-4)())
+    default = rate(ours(None), seconds)
+    default_error = math.dist(ours(None)(), ours(1e-4)())
+    own_default = f'{number(default)} per CPU-second, {number(default_error * 1e3, 1)} mm off'
     light = {'inertia_axial_kg_m2': 2.4e-3 / 2, 'inertia_diametral_kg_m2': 1.2e-3 / 2}
     moved = math.dist(ours(0.02, **light)(), ours(0.02)())
     own = f'{number(mine)} per CPU-second, {number(error * 1e3, 1)} mm off'
@@ -98,6 +102,14 @@ def lines(seconds: float = 3.0) -> tuple[Line, ...]:
             ours=own,
             beside=f'FrisPy {number(theirs)}, {number(off * 1e3, 1)} mm off',
             ratio=mine / theirs,
+        ),
+        Line(
+            what='the same by default, with error control',
+            ours=own_default,
+            beside=f'FrisPy {number(theirs)}, {number(off * 1e3, 1)} mm off',
+            ratio=default / theirs,
+            bound=f'at least {LEAST:g} times',
+            kept=default >= LEAST * theirs,
         ),
         Line(
             what='half the inertia moves the end',

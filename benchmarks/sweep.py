@@ -5,6 +5,7 @@ Usage: python benchmarks/sweep.py [--longest SECONDS] [--short] [COUNT ...]
 Each count is one run of the program: a Monte Carlo study of the Fig. 5 throw with six scattered
 quantities, into a Parquet file, with its summary. The system reports its time and memory. With
 --short each flight is one step of 20 ms: the cost of sampling, writing, joining and statistics.
+`make bench` compares one worker with two.
 """
 
 import argparse
@@ -15,15 +16,45 @@ import sys
 import tempfile
 import time
 
+from lines import Line, number
+
+COUNT = 300_000
+ROUNDS = 3
+LEAST = 1.9  # times the rate of one worker
 SCATTER = ('speed=1', 'pitch=2', 'roll=3', 'yaw=2', 'spin=1', 'lift_factor=0.03')
 PROGRAM = Path(sys.executable).with_name('sweep')
 
 
-def measure(count: int, folder: Path, *, short: bool) -> tuple[float, float, int, int]:
+def lines(count: int = COUNT) -> tuple[Line, ...]:
+    """Measure a study with one worker and with two, alternately."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        measure(2, folder, short=False)  # compiles
+        pairs = [
+            [measure(count, folder, short=False, workers=n)[0] for n in (1, 2)]
+            for _ in range(ROUNDS)
+        ]
+    one, two = (min(seconds) for seconds in zip(*pairs, strict=True))
+    return (
+        Line(
+            what=f'`sweep` of {count:,} throws in 20 ms steps, 2 workers',
+            ours=f'{number(count / two)} flights a second, with start, file and summary',
+            beside=f'1 worker {number(count / one)}',
+            ratio=one / two,
+            bound=f'at least {LEAST:g} times',
+            kept=one >= LEAST * two,
+        ),
+    )
+
+
+def measure(
+    count: int, folder: Path, *, short: bool, workers: int = 0
+) -> tuple[float, float, int, int]:
     """Return wall time [s], CPU time [s], peak memory [bytes] and size of the file [bytes]."""
     words = [str(PROGRAM), '--count', str(count), '--step', '0.02', '--output', 'a.parquet']
     words += ['--force', *(word for text in SCATTER for word in ('--scatter', text))]
     words += ['--no-ground', '--duration', '0.02'] if short else []
+    words += ['--workers', str(workers)] if workers else []
     started = time.perf_counter()
     with subprocess.Popen(
         words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
