@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.arrays import FloatArray
 
 SECTORS = 12
+_FIELD_OF_VIEW = (60.0, 45.0)  # degrees, as trimesh has it; the page's own camera replaces it
 _PER_SECTOR = 6  # flat faces around the rim
 # From the middle of the top over the rim to the middle of the underside: radius and height, in
 # diameters. The plane of the disc, z = 0, goes through the centre of mass.
@@ -44,7 +45,11 @@ def scene() -> trimesh.Scene:
             )
         )
         meshes[name] = mesh
-    return trimesh.Scene(meshes)
+    # Without a name trimesh draws one, and no two pages would have the same bytes.
+    camera = trimesh.scene.Camera(name='camera', fov=_FIELD_OF_VIEW)
+    made = trimesh.Scene(meshes, camera=camera)
+    made.set_camera(fov=camera.fov)
+    return made
 
 
 def _turned(sectors: list[int]) -> trimesh.Trimesh:

@@ -1,8 +1,11 @@
 """predict: CSV files and bags through the predictor."""
 
 import json
+import os
 from pathlib import Path
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -55,6 +58,29 @@ def test_bag_of_the_simulator_gives_its_landing(capsys):
     # The last prediction weighs measurements as if they had 2 cm of noise.
     assert landing == pytest.approx(FIG5_LANDING, abs=0.02)
     assert any(line.strip().startswith('1.0') for line in rest)
+
+
+@pytest.mark.parametrize('source', ['csv', 'bag'])
+def test_same_recording_gives_the_same_bytes(csv, tmp_path, source):
+    """In two processes, whose sets and dictionaries of text have other orders.
+
+    JSON has every number with all its digits, so that equal text is equal bits.
+    """
+    file = {'csv': csv[0], 'bag': SAMPLE}[source]
+    written = []
+    for seed in ('1', '2'):
+        plot, page = (tmp_path / f'throw{seed}.{ending}' for ending in ('png', 'html'))
+        command = [sys.executable, '-m', 'disc_sim_ros.cli.predict', str(file), '--json']
+        command += ['--disc', 'frisbee', '--disc', 'ultrastar']
+        ran = subprocess.run(
+            [*command, '--plot', str(plot), '--html', str(page)],
+            env=os.environ | {'PYTHONHASHSEED': seed},
+            stdout=subprocess.PIPE,
+            check=True,
+        )
+        assert json.loads(ran.stdout)['throws'][0]['predictions']
+        written.append((ran.stdout, plot.read_bytes(), page.read_bytes()))
+    assert written[0] == written[1]
 
 
 @pytest.mark.parametrize(
