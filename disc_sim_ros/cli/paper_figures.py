@@ -2,11 +2,11 @@
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 import multiprocessing
 import os
 from pathlib import Path
+from queue import SimpleQueue
 import sys
 import tempfile
 import time
@@ -20,6 +20,8 @@ from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import flight
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from disc_sim_ros.paper.run import Done
 
 FORMATS = ('png', 'svg')
@@ -133,12 +135,13 @@ def _parts(chosen: argparse.Namespace, folder: Path) -> Iterator['Done']:
         return
     with executors.processes(min(chosen.jobs, len(chosen.only))) as pool:
         try:
-            waiting = [
-                pool.submit(run.part, key, folder, chosen.formats, dark=chosen.dark)
-                for key in sorted(chosen.only, key=lambda key: key not in SLOW)
-            ]
-            for future in as_completed(waiting):
-                yield future.result()
+            finished: SimpleQueue[Future[Done]] = SimpleQueue()
+            for key in sorted(chosen.only, key=lambda key: key not in SLOW):
+                executors.submitted(
+                    pool, finished, run.part, key, folder, chosen.formats, dark=chosen.dark
+                )
+            for _ in chosen.only:
+                yield finished.get().result()
         except BaseException:
             for child in multiprocessing.active_children():
                 child.terminate()

@@ -1,11 +1,10 @@
 """Solve the least-squares problem: starts, robust loss, and the best parameters so far."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 import itertools
 import math
-import os
 from typing import TypeVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
 from disc_sim_ros.estimation.observations import ATTITUDE, GYRO
 from disc_sim_ros.estimation.problem import ROUGH, Problem
 from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw
+from disc_sim_ros.threads import Threads
 
 _CORNER = 2.5  # standard deviations at which the loss of a residual turns from square to straight
 _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
@@ -85,10 +85,8 @@ def cost_of_throw(problem: Problem, k: int, here: FloatArray) -> float:
 def _each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
     """Return the results for all throws, computed side by side."""
     n = len(problem.throws)
-    if n == 1:
-        return [work(0)]
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, n)) as pool:
-        return list(pool.map(work, range(n)))
+    with Threads(most=n) as pool:
+        return pool.run(partial(work, k) for k in range(n))
 
 
 @dataclass(frozen=True, eq=False)

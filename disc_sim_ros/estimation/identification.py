@@ -1,9 +1,8 @@
 """From measured throws to the coefficients of a disc with standard errors: `identify`."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-import os
+from functools import partial
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.sampled import fly_sampled
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import COEFFICIENT_SPREAD
+from disc_sim_ros.threads import Threads
 
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
 _START_SPREAD = 0.5  # of the prior: how far other starts lie
@@ -266,8 +266,8 @@ def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, Floa
             progress('releases', done, float('nan'))
         return result
 
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(problem.throws))) as pool:
-        fitted = list(pool.map(start, range(len(problem.throws))))
+    with Threads(most=len(problem.throws)) as pool:
+        fitted = pool.run(partial(start, k) for k in range(len(problem.throws)))
     problem = replace(problem, throws=tuple(alone.throw for alone in fitted))
     x = problem.means.copy()
     x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)

@@ -1,7 +1,6 @@
 """Many flights in single steps, with control of each on the way: for learning and for swarms."""
 
-from concurrent.futures import ThreadPoolExecutor
-import os
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +17,7 @@ from disc_sim_ros.physics.kernels.simd import WIDTH
 from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import CONTROL, LAUNCH, MEAN_WIND
+from disc_sim_ros.threads import Threads
 from disc_sim_ros.validation import Quantity
 
 _LEAST = 64  # blocks for which a second thread pays
@@ -66,14 +66,13 @@ class BatchSimulator:
         lanes_table = step_batch.lanes_table(table) if COMPILED else table
         self._lanes_plant = setup.plant._replace(table=lanes_table)
         blocks = len(self._batch.status)
-        workers = min(threads or os.cpu_count() or 1, max(blocks // _LEAST, 1))
+        self._threads = Threads(threads, most=blocks // _LEAST)
+        workers = self._threads.count
         self._bounds = [blocks * k // workers for k in range(workers + 1)]
-        self._pool = ThreadPoolExecutor(workers - 1) if workers > 1 else None
 
     def close(self) -> None:
         """End the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._threads.close()
 
     def release(self, flights: ArrayLike, launches: ArrayLike, winds: ArrayLike) -> None:
         """Release some discs, and set their control inputs to 0.
@@ -173,14 +172,8 @@ class BatchSimulator:
         Args:
             steps: Number of steps.
         """
-        if self._pool is None:
-            self._advance(0, self._bounds[-1], steps)
-            return
-        parts = list(zip(self._bounds, self._bounds[1:], strict=False))
-        futures = [self._pool.submit(self._advance, *part, steps) for part in parts[1:]]
-        self._advance(*parts[0], steps)
-        for future in futures:
-            future.result()
+        parts = zip(self._bounds, self._bounds[1:], strict=False)
+        self._threads.run(partial(self._advance, *part, steps) for part in parts)
 
     def _advance(self, start: int, stop: int, steps: int) -> None:
         advance = step_batch.advance_batch if COMPILED else step_batch.advance_singly

@@ -1,10 +1,9 @@
 """Many flights at once, equal to those of `flight.fly`: in SIMD registers, on all cores."""
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 import math
-import os
 from typing import Any
 
 import numpy as np
@@ -31,6 +30,7 @@ from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.kernels.wind import GUST_INTERVAL, NOISE_COLUMNS
 from disc_sim_ros.physics.launch import ABOVE_GROUND
 from disc_sim_ros.quantities import DURATION, LAUNCH, VARIED
+from disc_sim_ros.threads import Threads
 
 # A thread takes as many flights at a time as it flies in about 0.1 s, so that Ctrl-C acts soon.
 _ON_GROUND = 1e-8  # m; a landing is located to 1e-9 s
@@ -150,18 +150,8 @@ def fly_many(
             common.fly_in_gusts(row[np.newaxis], i, int(gust_seeds[i]), space)
 
     starts = range(0, n, chunk)
-    workers = min(threads or os.cpu_count() or 1, len(starts))
-    if workers <= 1:
-        for start in starts:
-            work(start)
-        return Landings(*ends)
-    pool = ThreadPoolExecutor(workers)
-    try:
-        futures: list[Future[None]] = [pool.submit(work, start) for start in starts]
-        for future in futures:
-            future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
+    with Threads(threads, most=len(starts)) as pool:
+        pool.run(partial(work, start) for start in starts)
     return Landings(*ends)
 
 

@@ -1,7 +1,7 @@
 """Flights from any state, sampled at any times: the model that estimators fit to measurements."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 import os
 
 import numpy as np
@@ -24,6 +24,7 @@ from disc_sim_ros.physics.kernels.sampling import (
 )
 from disc_sim_ros.physics.kernels.simd import WIDTH
 from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
+from disc_sim_ros.threads import Threads
 
 _FLIGHTS_A_THREAD = 64  # fewer are not worth a second thread
 
@@ -120,14 +121,10 @@ def fly_sampled(
             states[start:stop], rows[start:stop], plant, inputs, grid, part, sample_space(plant)
         )
 
-    parts = min(threads, os.cpu_count() or 1, -(-n // _FLIGHTS_A_THREAD))
-    if parts <= 1:
-        work(0, n)
-    else:
-        size = -(-n // (parts * WIDTH)) * WIDTH
-        with ThreadPoolExecutor(parts) as pool:
-            for future in [pool.submit(work, i, min(i + size, n)) for i in range(0, n, size)]:
-                future.result()
+    parts = max(min(threads, os.cpu_count() or 1, -(-n // _FLIGHTS_A_THREAD)), 1)
+    size = -(-n // (parts * WIDTH)) * WIDTH
+    with Threads(parts) as pool:
+        pool.run(partial(work, i, min(i + size, n)) for i in range(0, n, max(size, 1)))
     return Sampled(*out)
 
 

@@ -8,12 +8,17 @@ from multiprocessing import resource_tracker
 import os
 import signal
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.quantities import STUDY
+from disc_sim_ros.threads import ctrl_c_waits
 
+if TYPE_CHECKING:
+    from queue import SimpleQueue
+
+_T = TypeVar('_T')
 THREADS, PROCESSES, DASK = 'threads', 'processes', 'dask'
 _PATIENCE = 10.0  # s, longest wait for an answer of a Dask scheduler
 
@@ -67,7 +72,7 @@ class _Processes(ProcessPoolExecutor):
     """
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        with _ctrl_c_waits():
+        with ctrl_c_waits():
             resource_tracker.ensure_running()  # it would unblock SIGINT when it starts
             before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
             try:
@@ -76,25 +81,26 @@ class _Processes(ProcessPoolExecutor):
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@contextmanager
-def _ctrl_c_waits() -> Iterator[None]:
-    """Hold Ctrl-C back until the end of the block; in the main thread, which alone handles it.
+def submitted(
+    executor: Executor,
+    finished: 'SimpleQueue[Future[_T]]',
+    function: Callable[..., _T],
+    *args: Any,
+    **kwargs: Any,
+) -> 'Future[_T]':
+    """Submit a call to an executor; its future comes out of the queue `finished` at its end.
 
-    To block SIGINT is not enough: another thread, such as that of the executor, may take it, and
-    Python then runs the handler in the main thread all the same.
+    Args:
+        executor: The executor.
+        finished: The queue; wait at it in place of `concurrent.futures.wait` or `as_completed`.
+        function: The function.
+        args: Its arguments.
+        kwargs: Its named arguments.
     """
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
-        return
-    held: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        if held:
-            signal.raise_signal(signal.SIGINT)
+    with ctrl_c_waits():
+        future = executor.submit(function, *args, **kwargs)
+        future.add_done_callback(finished.put)
+    return future
 
 
 def _begin_worker() -> None:

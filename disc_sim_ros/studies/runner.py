@@ -1,23 +1,17 @@
 """Runs a study: batches of flights in threads, processes, Dask or any other executor."""
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
 import numpy as np
 
 from disc_sim_ros.errors import ConfigError, DiscSimError, InterruptedSweepError
 from disc_sim_ros.studies import tables
+from disc_sim_ros.studies.executors import submitted
 from disc_sim_ros.studies.flying import fly_batch
 from disc_sim_ros.studies.storage import DEFAULT_BATCH, Parts
 from disc_sim_ros.studies.study import Study, study_differences, study_document
@@ -170,16 +164,18 @@ class _Work:
     def _drive(self, executor: Executor, threads: int | None, ahead: int) -> None:
         waiting = list(reversed(self.numbers))
         flying: dict[Future[tables.Columns], int] = {}
+        finished: SimpleQueue[Future[tables.Columns]] = SimpleQueue()
         try:
             while waiting or flying:
                 while waiting and len(flying) < max(ahead, 1):
                     start, stop = self.span(waiting[-1])
-                    future = executor.submit(fly_batch, self.study, start, stop, threads)
+                    future = submitted(
+                        executor, finished, fly_batch, self.study, start, stop, threads
+                    )
                     flying[future] = waiting.pop()
-                done, _ = wait(flying, return_when=FIRST_COMPLETED)
-                for future in done:
-                    columns = future.result()
-                    self.keep(flying.pop(future), columns)
+                future = finished.get()
+                columns = future.result()
+                self.keep(flying.pop(future), columns)
         except BaseException:
             self._keep_finished(flying)
             raise
