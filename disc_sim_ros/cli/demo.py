@@ -185,6 +185,8 @@ def _record(
         watcher.throw()
         ended = watcher.watch(chosen.seconds, progress.show)
         progress.line(ended)
+        if not watcher.wait_until_kept(bag):
+            progress.line('the recorder has not received every flight event')
         recorder.end()
         sim.end()
 

@@ -212,6 +212,7 @@ class EventKey:
     SOURCE = 'from'  # of a throw: 'launch' or the topic that commanded it
     SPEED = 'speed_m_s'
     SPIN = 'spin_rad_s'
+    REPLACED = 'replaced_flight'  # number of the flight that a throw ended in the air
     JUMP = 'jump_s'  # by how much later the present step is stamped from now on, `exact_seconds`
     CAUSE = 'cause'  # of a jump: see `ros.sim.events`
 

@@ -123,7 +123,9 @@ class Watcher:
         if resume:
             self._resume_recorder()
         recorded = f'{self._namespace}/{topics.ODOM}'
-        self._wait(lambda: _has(bag, recorded), START, 'the first messages in the bag')
+        self._wait(
+            lambda: recorded_messages(bag, recorded), START, 'the first messages in the bag'
+        )
 
     def wait_until_followed(self) -> None:
         """Wait until a predictor follows `odom` of the simulator.
@@ -132,6 +134,28 @@ class Watcher:
             DiscSimError: It takes too long, or a process ended.
         """
         self._wait(self._is_followed, START, 'the simulator and a predictor that follows odom')
+
+    def wait_until_kept(self, bag: Path) -> bool:
+        """Wait until a bag has the flight events that came here: a recorder may get them later.
+
+        Args:
+            bag: The bag that the recorder fills.
+
+        Returns:
+            False if it does not have them after `SERVICE` seconds.
+
+        Raises:
+            DiscSimError: A process ended.
+        """
+        topic = f'{self._namespace}/{topics.FLIGHT_EVENTS}'
+        end = time.monotonic() + SERVICE
+        while recorded_messages(bag, topic) < len(self._events):
+            if time.monotonic() > end:
+                return False
+            for process in self._processes:
+                process.check()
+            self._spin(0.05)
+        return True
 
     def pause(self, seconds: float) -> None:
         """Let wall time pass [s]."""
@@ -255,10 +279,10 @@ class Watcher:
         self._odometry = message
 
 
-def _has(bag: Path, topic: str) -> bool:
-    """Return True if messages of a topic are on the disk."""
+def recorded_messages(bag: Path, topic: str) -> int:
+    """Return the number of messages of a topic that a recorder has on the disk."""
     try:
         information = metadata.parse((bag / metadata.FILE_NAME).read_text(encoding='utf-8'))
     except (OSError, BagError):
-        return False
-    return any(info.topic.name == topic and info.message_count for info in information.topics)
+        return 0
+    return sum(info.message_count for info in information.topics if info.topic.name == topic)

@@ -14,6 +14,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from disc_sim_ros.analysis.flights import flights
 from disc_sim_ros.analysis.recording import discs
 from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.ros.client import recorded_messages
 from disc_sim_ros.ros.processes import started
 from disc_sim_ros.topics import PredictorTopic
 from ros.recorder_process import Recorder
@@ -37,6 +38,8 @@ def test_it_throws_when_all_topics_are_recorded(ros, tmp_path):
         try:
             ros.spin_until(lambda: throw.poll() is not None, 'the throw')
             ros.spin_until(lambda: len(events) > 1, 'the landing')
+            # It came here; to the recorder it may come later.
+            ros.spin_until(lambda: recorded_messages(bag, '/flight_events') > 1, 'its record')
             assert throw.returncode == 0
             assert recorder.end() == 0
         finally:

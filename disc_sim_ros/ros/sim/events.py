@@ -44,22 +44,32 @@ RESET = Event(FlightEvent.RESET, 'the disc is back at its launch, at rest')
 COMMAND_EXPIRED = Event(FlightEvent.COMMAND_EXPIRED, 'a command was not renewed and fell to zero')
 
 
-def thrown(state: State, flight: int, source: str) -> Event:
+def thrown(state: State, flight: int, source: str, *, replaced: int = 0) -> Event:
     """Return the event of a release.
 
     Args:
         state: State at the release.
         flight: Number of the flight.
         source: What asked for the throw: 'launch' for the parameters, or the topic or service.
+        replaced: Number of the flight that this throw ended in the air; 0 if there was none.
     """
     speed = math.hypot(*state[3:6])
-    values = {
+    values: dict[str, object] = {
         EventKey.FLIGHT: flight,
         EventKey.SOURCE: source,
         EventKey.SPEED: speed,
         EventKey.SPIN: state.r,
     }
-    return Event(FlightEvent.THROWN, f'{speed:.2f} m/s, spin {state.r:.2f} rad/s', values)
+    text = f'{speed:.2f} m/s, spin {state.r:.2f} rad/s'
+    if replaced:
+        values[EventKey.REPLACED] = replaced
+        text += f'; {replacement(replaced)}'
+    return Event(FlightEvent.THROWN, text, values)
+
+
+def replacement(flight: int) -> str:
+    """Return a sentence about the flight that a throw ended in the air."""
+    return f'flight {flight} ended in the air'
 
 
 def landed(sim: FlightSimulator, flight: int, released: int) -> Event:

@@ -22,7 +22,7 @@ from disc_sim_ros.ros.sim.compiled_loop import (
     compiled_loop,
 )
 from disc_sim_ros.ros.sim.config import SimConfig
-from disc_sim_ros.ros.sim.events import Counts
+from disc_sim_ros.ros.sim.events import Counts, replacement
 from disc_sim_ros.ros.sim.publishers import Publishers
 from disc_sim_ros.ros.sim.realtime import Pacer, configure_thread
 from disc_sim_ros.ros.sim.simulation import Simulation
@@ -125,12 +125,13 @@ class SimLoop(threading.Thread):
 
     def throw(self) -> str:
         """Release the disc as configured; this ends a flight that is in the air."""
-        self._keeping_pace(self._simulation.throw)
+        sim = self._simulation
+        ended = f'; {replacement(sim.flight)}' if sim.flying else ''
+        self._keeping_pace(sim.throw)
         self.stopped = False
         if self.paused:
-            self._simulation.publish()
-        number = self._simulation.flight
-        return f'flight {number}, released at {exact_seconds(self.clock.now)} s'
+            sim.publish()
+        return f'flight {sim.flight}, released at {exact_seconds(self.clock.now)} s{ended}'
 
     def reset(self) -> str:
         """Put the disc at its launch, at rest; discard commands and count flights from 1 again."""

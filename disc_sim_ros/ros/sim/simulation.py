@@ -239,9 +239,9 @@ class Simulation:
             self.inputs.wind, turbulence=gusts.turbulence, seed=(gusts.seed + self.flight) % 2**63
         )
         setup = replace(config.setup, wind=wind)
-        state = release or config.launch.state()
-        sim = FlightSimulator(setup, state, ground=config.ground)
+        sim = FlightSimulator(setup, release or config.launch.state(), ground=config.ground)
         sim.take(self.inputs.active.control)
+        replaced = self.flight if self.flying else 0
         self._sim = sim
         self.imu_errors = ImuErrors(config.imu, self.flight, config.publish_period)
         self.flight += 1
@@ -262,7 +262,7 @@ class Simulation:
         self.publishers.publish_release(self._released, sim.state, text, setup.disc.diameter)
         self.inputs.publish_wind()
         self.inputs.publish_control()
-        event = events.thrown(sim.state, self.flight, source)
+        event = events.thrown(sim.state, self.flight, source, replaced=replaced)
         self._publish_event(event)
         self._inform(f'flight {self.flight} thrown: {event.text}', event.name)
 

@@ -39,9 +39,10 @@ def time_in(response, pattern: str) -> int:
     return round(float(match[1]) * SECOND)
 
 
-def throw(ros, sim, flight: int) -> int:
-    """Throw; return the stamp of the release [ns]."""
-    return time_in(ros.call(sim, 'throw'), f'flight {flight}, released at TIME')
+def throw(ros, sim, flight: int, *, replaced: int = 0) -> int:
+    """Throw, which ends a flight in the air where `replaced`; return the stamp of it [ns]."""
+    end = f'; flight {replaced} ended in the air' if replaced else ''
+    return time_in(ros.call(sim, 'throw'), f'flight {flight}, released at TIME{end}')
 
 
 def since(odom: list[bytes], release: int, until: float = math.inf) -> dict[int, bytes]:

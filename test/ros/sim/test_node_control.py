@@ -44,6 +44,7 @@ from ros.sim.sim_messages import (
 )
 
 pytestmark = pytest.mark.ros
+ENDED = 'ended in the air'
 
 
 # ---- pause, step, reset, throw ----
@@ -76,7 +77,7 @@ def test_services_work_in_any_order(ros):
         moving = math.hypot(linear.x, linear.y, linear.z)
         return newest.pose.pose.position.z == height and moving == pytest.approx(speed)
 
-    assert throw(ros, sim, 2) == now  # also while paused
+    assert throw(ros, sim, 2, replaced=1) == now  # also while paused
     ros.spin_until(lambda: ns(odom[-1]) == now and shown(20.0, 15.0), 'the second release')
     for _ in range(2):
         assert ros.call(sim, 'reset').success
@@ -138,6 +139,26 @@ def test_a_throw_message_replaces_the_flight(ros):
     ros.spin_until(lambda: len(releases) == 4, 'a fourth')
     assert releases[3].header.stamp == later.header.stamp
     ros.spin_until(lambda: names(events) == ['thrown'] * 4, 'four events')
+    # Each throw but the first says that it ended the flight before, in the log as well.
+    said = [event.message.partition('; ')[2] for event in events]
+    assert said == ['', *(f'flight {n} {ENDED}' for n in (1, 2, 3))]
+    replaced = [{v.key: v.value for v in e.values}.get('replaced_flight') for e in events]
+    assert replaced == [None, '1', '2', '3']
+    line = re.compile(r'flight (\d) thrown: [^;\n]*(?:; (.*))?\n')
+    lines = [(str(n), text) for n, text in enumerate(said, start=1)]
+    ros.spin_until(lambda: line.findall(sim.stderr) == lines, 'the log')
+
+
+def test_a_throw_after_a_landing_or_a_reset_replaces_nothing(ros):
+    sim = ros.start(AT_LAUNCH | {'launch.height': 2.0, 'real_time_factor': 5.0})
+    events = ros.subscribe(DiagnosticStatus, 'flight_events')
+    throw(ros, sim, 1)
+    ros.spin_until(lambda: names(events) == ['thrown', 'landed'], 'the landing')
+    throw(ros, sim, 2)
+    assert ros.call(sim, 'reset').success
+    throw(ros, sim, 1)
+    ros.spin_until(lambda: names(events).count('landed') == 2, 'the last landing')
+    assert not any('in the air' in event.message for event in events)
 
 
 def test_fifty_throws_a_second_are_all_answered(ros):
@@ -157,7 +178,7 @@ def test_fifty_throws_a_second_are_all_answered(ros):
     duration = time.monotonic() - begin
     assert duration < patience(2.0)
     released = [
-        time_in(response, f'flight {i}, released at TIME')
+        time_in(response, f'flight {i}, released at TIME{f"; flight {i - 1} {ENDED}" * (i > 1)}')
         for i, response in enumerate(responses, start=1)
     ]
     fly_until(ros, odom, released[-1] + PERIOD)
@@ -293,7 +314,7 @@ def test_changes_take_effect_when_they_should(ros):
     assert all(flown[t] == calm[t] for t in flown if t <= change - release)
     assert all(flown[t] != calm[t] for t in flown if t > change - release)
 
-    release = throw(ros, sim, 2)
+    release = throw(ros, sim, 2, replaced=1)
     ros.spin_until(lambda: len(configurations) == 2, 'the configuration')
     old, new = (yaml.safe_load(text.data) for text in configurations)
     assert (old['disc'], old['physics_rate'], old['gravity']) == ('frisbee', 1000.0, 9.81)

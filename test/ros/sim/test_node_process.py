@@ -300,7 +300,7 @@ def test_a_late_subscriber_gets_the_disc_and_its_path(ros):
     spacing = np.diff([stamp(pose) for pose in paths[-1].poses])
     assert set(spacing) == {SECOND // 20}
     assert {pose.header.frame_id for pose in paths[-1].poses} == {'map'}
-    release = throw(ros, sim, 2)
+    release = throw(ros, sim, 2, replaced=1)
     ros.spin_until(lambda: stamp(paths[-1]) > release, 'the new path')
     assert stamp(paths[-1].poses[0]) == release
     ros.spin_until(lambda: len(releases) == len(latched[String]) == 2, 'the second throw')
