@@ -24,7 +24,7 @@ from disc_sim_ros.physics.tracked import Tracker, Tracks
 
 _LANDING = 3  # X, Y and time of a landing
 POSITION = 3  # the first unknowns: position, in which flights are linear
-FRACTIONS = np.array([1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.0])  # of a step, tried at once
+FRACTIONS = np.array([1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.0])  # of a step, tried at once; last 0
 GATE = 14.0  # squared residual of a position from which it counts less; 1 in 350 is beyond
 _USUAL = 2.37  # median of chi-squared with 3 degrees of freedom
 
@@ -207,6 +207,7 @@ class Fitted:
         landing: X, Y and time; nan without a landing, shape (3,).
         last: State at the newest measurement, shape (14,).
         cost: Half its sum of squares.
+        gain: By how much the step to it lowered the cost.
     """
 
     estimate: Estimate
@@ -214,6 +215,7 @@ class Fitted:
     landing: FloatArray
     last: FloatArray
     cost: float
+    gain: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,4 +370,5 @@ def best_on_line(
         tracks.landing[i],
         tracks.last[i],
         float(cost[i]),
+        float(cost[-1] - cost[i]),
     )
