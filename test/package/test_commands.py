@@ -24,6 +24,7 @@ def tree(tmp_path) -> Path:
     shutil.copy(ROOT / 'pyproject.toml', tmp_path)
     shutil.copytree(ROOT / 'tools', tmp_path / 'tools', ignore=shutil.ignore_patterns('viewer'))
     (tmp_path / '.venv').symlink_to(sys.prefix)
+    (tmp_path / 'tools/compile.py').write_text('"""Nothing here flies."""\n', encoding='utf-8')
     (tmp_path / 'examples').mkdir()
     (tmp_path / 'examples/good.py').write_text('"""A module."""\n', encoding='utf-8')
     return tmp_path
