@@ -1,7 +1,7 @@
 """The analysis of one recorded flight: its trajectory, launch, landing, wind and verification."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 import math
 from pathlib import Path
@@ -29,11 +29,13 @@ from disc_sim_ros.physics.flight_config import Key, landing_from
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.trajectory import Trajectory
 from disc_sim_ros.topics import Loss
+from disc_sim_ros.units import NANOSECONDS
 
 # Those of recorder_node, and words that other recorders may use.
 _LOSSES = re.compile('|'.join([*Loss, 'drop', 'loss', 'gap', 'missed']), re.IGNORECASE)
 
 
+_SAME = 1e-3  # periods; stamps are rounded down to nanoseconds
 _ATTITUDE_AND_RATES = slice(State._fields.index('e0'), State._fields.index('r') + 1)
 
 
@@ -154,9 +156,24 @@ def analyse(flight: Flight, bag_doubts: tuple[str, ...] = ()) -> Analysis:
         wind=wind,
         release=State(*states[0].tolist()) if again is None else again.config.release,
         landing=landing,
-        stamps=stamps_of(flight.evened),
+        stamps=_stamps(flight, again),
         checks=tuple(checks(flight.evened)),
     )
+
+
+def _stamps(flight: Flight, again: Reflight | None) -> Stamps:
+    """Return how the messages follow each other, from the release on and up to the end."""
+    if again is None:
+        return stamps_of(flight.evened)
+    rate = again.config.publish_rate
+    after = 0
+    if flight.until is not None:
+        last = int(flight.motion.stamps[-1])
+        jumped = sum(shift for at, shift in flight.disc.jumps if last < at <= flight.until)
+        periods = (flight.until - last - jumped) * rate / NANOSECONDS
+        after = max(math.ceil(periods - _SAME) - 1, 0)
+    before = max(round(flight.starts_late * rate), 0)
+    return replace(stamps_of(flight.evened, rate), before=before, after=after)
 
 
 def _mean_wind(flight: Flight, again: Reflight | None) -> tuple[FloatArray, WindSource]:

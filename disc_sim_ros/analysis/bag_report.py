@@ -74,6 +74,8 @@ def document(a: Analysis) -> dict[str, Any]:
             'rate_hz': a.stamps.rate,
             'longest_gap_s': a.stamps.longest,
             'missing': a.stamps.missing,
+            'missing_before': a.stamps.before,
+            'missing_after': a.stamps.after,
             'repeated_stamps': a.stamps.repeated,
             'backward_stamps': a.stamps.backwards,
             'time_jumps': len(flight.jumps),
@@ -158,10 +160,9 @@ def summary(a: Analysis, system: System = METRIC) -> str:
     d, text = document(a), system.text
     launch, setup = d['launch'], d['setup']
     what = '' if setup is None else f'{_disc_and_model(setup)}, '
-    when = datetime.fromtimestamp(a.flight.start / NANOSECONDS, UTC)
     lines = [
-        f'  flight {a.flight.number}: {what}{when:%Y-%m-%d %H:%M:%S} UTC'
-        + (f', {d["starts_late_s"]:.3f} s of it before the bag' if d['starts_late_s'] else ''),
+        f'  flight {a.flight.number}: {what}{utc(a.flight.start)} UTC'
+        + (f', seen from {d["starts_late_s"]:.3f} s on' if d['starts_late_s'] else ''),
         f'    {_start_word(a.flight)} {text(launch["speed_m_s"], "m/s")}, '
         f'{_attitude_text(launch)}, {text(launch["height_m"], "m")} up',
         f'    spin      {_spin_text(launch["spin_rad_s"], system)}',
@@ -203,6 +204,11 @@ def summary(a: Analysis, system: System = METRIC) -> str:
     return '\n'.join(lines)
 
 
+def utc(stamp: int) -> str:
+    """Return the day and time of a stamp [ns]."""
+    return f'{datetime.fromtimestamp(stamp / NANOSECONDS, UTC):%Y-%m-%d %H:%M:%S}'
+
+
 def title(a: Analysis, system: System = METRIC) -> str:
     """Return one line with what flew and how far."""
     d = document(a)
@@ -229,8 +235,11 @@ def verification_text(a: Analysis) -> str:
             lines.append(f'      {check.name.replace("_", " ")}: {mark}, {check.text}')
         return '\n'.join(lines)
     if v.exact:
-        landed = ' and the landing' if a.flight.landing else ''
-        lines = [f'    verify    identical to the last bit: {v.compared} messages{landed}']
+        of = '' if a.flight.motion.has_twist else 'the poses of '
+        landed = ' and the landing' if v.whole_landing else ''
+        lines = [f'    verify    identical to the last bit: {of}{v.compared} messages{landed}']
+        if missing := a.stamps.all_missing:
+            lines[0] += f'; {missing} more are missing'
         return '\n'.join(lines + [f'      note: {doubt}' for doubt in v.doubts])
     same = '' if v.first is None else f', the first at {v.first:.3f} s'
     lines = [
@@ -304,11 +313,15 @@ def _steering_lines(flight: Flight) -> list[str]:
 def _stamps_text(stamps: Stamps) -> str:
     text = f'{stamps.count} at {stamps.rate:.6g} Hz'
     if stamps.even:
-        return f'{text}, stamps even'
-    return (
-        f'{text}, {stamps.missing} missing (longest gap {stamps.longest:.3f} s), '
-        f'{stamps.repeated} stamps repeated, {stamps.backwards} going back'
-    )
+        text += ', stamps even'
+    else:
+        text += (
+            f', {stamps.missing} missing (longest gap {stamps.longest:.3f} s), '
+            f'{stamps.repeated} stamps repeated, {stamps.backwards} going back'
+        )
+    if stamps.before:
+        text += f', {stamps.before} missing at the beginning'
+    return f'{text}, {stamps.after} missing at the end' if stamps.after else text
 
 
 def _tenths(x: float) -> str:

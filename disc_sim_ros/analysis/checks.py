@@ -22,11 +22,13 @@ class Stamps:
 
     Attributes:
         count: Messages.
-        rate: Messages a second [Hz], by the usual distance; 0 for one message.
+        rate: Messages a second [Hz]: as configured, else by the usual distance; 0 for one message.
         longest: Longest distance [s].
-        missing: Messages that are missing where stamps are even.
+        missing: Messages that are missing in between where stamps are even.
         repeated: Stamps that are the same as the one before.
         backwards: Stamps that are before the one before.
+        before: Messages that are missing before the first, where it is known what begins then.
+        after: Messages that are missing after the last, where it is known what ends then.
     """
 
     count: int
@@ -35,11 +37,18 @@ class Stamps:
     missing: int
     repeated: int
     backwards: int
+    before: int = 0
+    after: int = 0
 
     @property
     def even(self) -> bool:
         """Return True if each stamp follows the one before at the usual distance."""
         return not (self.missing or self.repeated or self.backwards)
+
+    @property
+    def all_missing(self) -> int:
+        """Return how many messages are missing, in between and at both ends."""
+        return self.before + self.missing + self.after
 
 
 @dataclass(frozen=True)
@@ -59,13 +68,19 @@ class Check:
     passed: bool
 
 
-def stamps_of(motion: Motion) -> Stamps:
-    """Return how the stamps of a motion follow each other."""
+def stamps_of(motion: Motion, rate: float | None = None) -> Stamps:
+    """Return how the stamps of a motion follow each other.
+
+    Args:
+        motion: The motion.
+        rate: The rate at which its messages were published [Hz]; None for the usual one.
+    """
     steps = np.diff(motion.stamps)
     ahead = steps[steps > 0]
     if not len(ahead):
-        return Stamps(len(motion), 0.0, 0.0, 0, int((steps == 0).sum()), int((steps < 0).sum()))
-    usual = float(np.median(ahead))
+        repeated, backwards = int((steps == 0).sum()), int((steps < 0).sum())
+        return Stamps(len(motion), rate or 0.0, 0.0, 0, repeated, backwards)
+    usual = NANOSECONDS / rate if rate else float(np.median(ahead))
     return Stamps(
         count=len(motion),
         rate=NANOSECONDS / usual,

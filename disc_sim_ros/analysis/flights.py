@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from disc_sim_ros.analysis.odometry import Motion
-from disc_sim_ros.analysis.recording import END_OF_BAG, THROWN_AGAIN, Began, Disc, Event, Flight
+from disc_sim_ros.analysis.recording import (
+    END_OF_BAG,
+    THROWN_AGAIN,
+    Began,
+    Disc,
+    Event,
+    Flight,
+    Release,
+)
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.topics import FlightEvent
 from disc_sim_ros.units import NANOSECONDS
@@ -26,15 +34,21 @@ def flights(disc: Disc) -> list[Flight]:
     in which the body moves, without a gap in time or a jump in place.
     """
     if disc.releases:
-        return list(_thrown(disc))
+        return [flight for _, flight in _thrown(disc) if flight is not None]
     return list(_moving(disc))
 
 
-def _thrown(disc: Disc) -> Iterator[Flight]:
+def unseen_throws(disc: Disc) -> list[Release]:
+    """Return the throws of which the bag holds no message of the motion."""
+    return [release for release, flight in _thrown(disc) if flight is None]
+
+
+def _thrown(disc: Disc) -> Iterator[tuple[Release, Flight | None]]:
+    """Yield each throw with its flight, None where the bag has no message of its motion."""
     stamps = disc.motion.stamps
     ends: list[int | None] = [release.stamp for release in disc.releases[1:]]
-    number = 0
-    for release, following in zip(disc.releases, [*ends, None], strict=True):
+    throws = zip(disc.releases, [*ends, None], strict=False)
+    for number, (release, following) in enumerate(throws, start=1):
         end, ended = following, THROWN_AGAIN if following else END_OF_BAG
         ending = _first(disc, ENDING, release.stamp, following)
         if ending is not None:
@@ -42,12 +56,16 @@ def _thrown(disc: Disc) -> Iterator[Flight]:
         landing = _first(disc, (FlightEvent.LANDED,), release.stamp, end)
         # If time stood still, the release has the stamp of a message of the disc at rest.
         first = max(int(np.searchsorted(stamps, release.stamp, 'right')) - 1, 0)
-        if stamps[first] < release.stamp or not disc.motion.numbers[first, 7:].any():
+        twist = disc.motion.numbers[first, 7:]
+        if stamps[first] < release.stamp or (len(twist) and not twist.any()):
             first += 1
         last = len(stamps) if end is None else int(np.searchsorted(stamps, end, 'left'))
-        if last > first:
-            number += 1
-            yield Flight(
+        if last <= first:
+            yield release, None
+            continue
+        yield (
+            release,
+            Flight(
                 disc,
                 number,
                 release.stamp,
@@ -55,7 +73,9 @@ def _thrown(disc: Disc) -> Iterator[Flight]:
                 release,
                 landing,
                 ended=FlightEvent.LANDED if landing else ended,
-            )
+                until=landing.stamp if landing else end,
+            ),
+        )
 
 
 def _first(disc: Disc, names: tuple[str, ...], start: int, end: int | None) -> Event | None:

@@ -138,6 +138,8 @@ class Flight:
         began: With what it begins, see `Began`.
         ended: What ended it: 'landed', 'thrown again', 'reset', 'failed' or 'end of the bag', and
             in bags of other recorders 'rest', 'gap' or 'jump'.
+        until: Up to which stamp its messages must reach [ns], as other topics tell; None if
+            nothing tells it.
     """
 
     disc: Disc
@@ -148,6 +150,7 @@ class Flight:
     landing: Event | None = None
     began: Began = Began.THROWN
     ended: str = END_OF_BAG
+    until: int | None = None
 
     @cached_property
     def motion(self) -> Motion:

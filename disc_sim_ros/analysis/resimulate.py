@@ -1,6 +1,6 @@
 """A recorded flight flown again from its configuration, commands and wind, and compared."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 import math
 
@@ -24,6 +24,7 @@ from disc_sim_ros.physics.simulator import FlightSimulator
 from disc_sim_ros.topics import Frames
 from disc_sim_ros.units import NANOSECONDS
 
+_LANDED = 'landed.'  # begins the names of the differences of a landing
 _ROUNDED = 2  # ns by which a stamp may miss its step: stamps are rounded down
 
 
@@ -67,6 +68,11 @@ class Verdict:
     largest: Mapping[str, float]
     first: float | None
     doubts: tuple[str, ...]
+
+    @property
+    def whole_landing(self) -> bool:
+        """Return True if every number of the landing was compared."""
+        return all(f'{_LANDED}{name}' in self.largest for name in Landing._fields)
 
     @property
     def exact(self) -> bool:
@@ -158,7 +164,7 @@ def _landing_differences(flight: Flight, again: Reflight) -> dict[str, float]:
     """Return the differences of the numbers of a recorded landing; infinite without a number."""
     recorded = flight.landing.values if flight.landing else {}
     return {
-        f'landed.{name}': _difference(
+        f'{_LANDED}{name}': _difference(
             recorded[name], math.inf if again.landing is None else again.landing[i]
         )
         for i, name in enumerate(Landing._fields)
@@ -179,8 +185,8 @@ def _doubts(flight: Flight, again: Reflight) -> list[str]:
     doubts = []
     if flight.starts_late > 1.5 / again.config.publish_rate:
         doubts.append(
-            f'the bag begins {flight.starts_late:.3f} s after the release: commands and changes '
-            'of the wind before that are not in it'
+            f'its first message is {flight.starts_late:.3f} s after the release: commands and '
+            'changes of the wind before that may be missing too'
         )
     missing = [name for name in topics.APPLIED if name not in flight.disc.topics]
     if missing:
@@ -188,8 +194,11 @@ def _doubts(flight: Flight, again: Reflight) -> list[str]:
     first, last = flight.motion.log[0], flight.motion.log[-1]
     if any(first <= at <= last for at in flight.disc.profile_changes):
         doubts.append('the profile of the wind was changed in flight, and no stamp records when')
-    if topics.FLIGHT_EVENTS not in flight.disc.topics and again.off_grid:
-        doubts.append(f'not recorded: {topics.FLIGHT_EVENTS}, which reports jumps of time')
+    if topics.FLIGHT_EVENTS not in flight.disc.topics:
+        reports = 'landings, resets and jumps of time'
+        doubts.append(f'not recorded: {topics.FLIGHT_EVENTS}, which reports {reports}')
+    else:
+        doubts += _missing_events(flight, again)
     unknown = {c.frame for c in flight.disc.changes if _axes_of(c, flight) is None}
     if unknown:
         doubts.append(f'moments in {", ".join(map(repr, sorted(unknown)))}: no frame of the disc')
@@ -200,6 +209,19 @@ def _doubts(flight: Flight, again: Reflight) -> list[str]:
     if again.lost:
         doubts.append(f'the re-flight ended: {again.lost}')
     return doubts
+
+
+def _missing_events(flight: Flight, again: Reflight) -> Iterator[str]:
+    """Yield which events are not in a bag that has the topic of events."""
+    thrown = (e.stamp for e in flight.disc.events if e.name == topics.FlightEvent.THROWN)
+    if flight.start not in thrown:
+        yield 'the event of the throw is missing, and so may be others, such as a reset'
+    if again.landing is None or flight.time[-1] <= again.landing.flight_time_s:
+        return
+    if flight.landing is None:
+        yield 'the event of the landing is missing'
+    elif lacks := [name for name in Landing._fields if name not in flight.landing.values]:
+        yield f'the event of the landing has no {", ".join(lacks)}'
 
 
 def _advance(sim: FlightSimulator, step: int) -> None:

@@ -110,9 +110,12 @@ def _run(chosen: argparse.Namespace) -> int:
             output.note(chosen.prog, line)
         else:
             output.show(line)
-    if chosen.verify and not every:
+    if not chosen.verify:
+        return 0
+    if not every:
         output.note(chosen.prog, 'note: there is no flight to verify')
-    return DIFFERENT if chosen.verify and not (every and all(a.passed for a in every)) else 0
+    unseen = any(flights.unseen_throws(disc) for disc in discs)
+    return 0 if every and not unseen and all(a.passed for a in every) else DIFFERENT
 
 
 def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
@@ -173,14 +176,14 @@ def _bag_document(bag: 'Bag') -> dict[str, Any]:
 def _disc_document(
     disc: 'Disc', analyses: 'Sequence[Analysis]', chosen: argparse.Namespace
 ) -> dict[str, Any]:
-    from disc_sim_ros.analysis import bag_report  # noqa: PLC0415
+    from disc_sim_ros.analysis import bag_report, flights  # noqa: PLC0415
 
-    flights = []
+    documents = []
     for a in analyses:
         document = bag_report.document(a)
         if chosen.verify:
             document['verification'] = bag_report.verification_document(a)
-        flights.append(document)
+        documents.append(document)
     return {
         'disc': disc.name,
         'topic': disc.motion.topic,
@@ -190,7 +193,8 @@ def _disc_document(
         'events': [
             {'name': e.name, 'stamp_ns': e.stamp, 'values': dict(e.values)} for e in disc.events
         ],
-        'flights': flights,
+        'flights': documents,
+        'unseen_throws_ns': [release.stamp for release in flights.unseen_throws(disc)],
     }
 
 
@@ -222,15 +226,19 @@ def _bag_lines(bag: 'Bag') -> list[str]:
 def _disc_lines(
     disc: 'Disc', analyses: 'Sequence[Analysis]', chosen: argparse.Namespace
 ) -> list[str]:
-    from disc_sim_ros.analysis import bag_report  # noqa: PLC0415
+    from disc_sim_ros.analysis import bag_report, flights  # noqa: PLC0415
 
     lines = [printable(f'{disc.name}: {disc.motion.topic}, {len(disc.motion)} messages')]
-    if not analyses:
+    if not analyses and not disc.releases:
         lines.append('  no flight: no throw was recorded, and the disc does not move')
     for a in analyses:
         lines.append(bag_report.summary(a, SYSTEMS[chosen.units]))
         if chosen.verify:
             lines.append(bag_report.verification_text(a))
+    if unseen := flights.unseen_throws(disc):
+        at = ', '.join(f'{bag_report.utc(release.stamp)} UTC' for release in unseen)
+        count = f'{len(unseen)} throw{"s" * (len(unseen) > 1)}'
+        lines.append(f'  MISSING: no message of the motion after {count} ({at})')
     return lines
 
 
