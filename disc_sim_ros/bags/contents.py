@@ -57,6 +57,7 @@ class Contents:
         private: Offset and length of the records of other programs (opcodes from 0x80).
         losses: What is damaged or missing.
         complete: The file has its end, and no damage was found.
+        closed: The file has its end: its recorder had no more to write.
     """
 
     path: Path
@@ -72,6 +73,7 @@ class Contents:
     private: list[tuple[int, int]] = field(default_factory=list)
     losses: list[Loss] = field(default_factory=list)
     complete: bool = False
+    closed: bool = False
 
     @property
     def data_path(self) -> Path:

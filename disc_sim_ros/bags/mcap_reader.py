@@ -110,7 +110,7 @@ class _Index:
         contents.metadata = [self._metadata(m) for m in summary.metadata]
         assert summary.statistics is not None  # noqa: S101 - for mypy
         contents.counts = dict(summary.statistics.channel_message_counts)
-        contents.complete = True
+        contents.complete = contents.closed = True
         return True
 
     def _read(self, at: int, size: int) -> bytes:

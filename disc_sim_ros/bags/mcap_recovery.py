@@ -91,6 +91,7 @@ class _Scan:
             at = self._record(at)
         self._end_run()
         self._check_definitions()
+        self._contents.closed = self._closed
         self._contents.complete = self._closed and not self._contents.losses
 
     def _record(self, at: int) -> int | None:

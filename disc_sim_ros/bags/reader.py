@@ -233,11 +233,30 @@ def open_bag(path: Path | str) -> Bag:
     return Bag(folder, contents, reported(contents, folder), whole=is_listed(folder, contents))
 
 
-def is_listed(folder: BagFolder, contents: Iterable[Contents]) -> bool:
-    """Return True if metadata.yaml counts the messages that are there; a lone file needs none."""
-    if folder.metadata is None:
+def is_listed(folder: BagFolder, contents: Sequence[Contents]) -> bool:
+    """Return True if metadata.yaml describes what is there; a lone file needs none.
+
+    It must count the messages of all topics and of each, and name no other types than the files.
+    """
+    about = folder.metadata
+    if about is None:
         return folder.path.is_file()
-    return folder.metadata.message_count == sum(c.message_count for c in contents)
+    if about.message_count != sum(c.message_count for c in contents):
+        return False
+    counts: dict[str, int] = {}
+    types: dict[str, set[str]] = {}
+    for c in contents:
+        for channel_id, channel in c.channels.items():
+            schema = c.schemas.get(channel.schema_id)
+            counts[channel.topic] = counts.get(channel.topic, 0) + c.counts.get(channel_id, 0)
+            types.setdefault(channel.topic, set()).add(full_type(schema.name) if schema else '')
+    listed: dict[str, int] = {}
+    for info in about.topics:
+        listed[info.name] = listed.get(info.name, 0) + info.message_count
+        known = types.get(info.name, {''})
+        if '' not in known and info.type and full_type(info.type) not in known:
+            return False
+    return all(counts.get(name, 0) == count for name, count in listed.items())
 
 
 def reported(contents: Iterable[Contents], folder: BagFolder) -> BagMetadata:

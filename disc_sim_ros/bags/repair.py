@@ -28,6 +28,8 @@ from disc_sim_ros.errors import BagError, ConfigError, DamageError, WriteError
 from disc_sim_ros.files import check_new_folder, reason, sync_folder, whole_folder, write_whole
 
 _BLOCK = 1 << 20  # bytes copied at a time
+_MOST_NOTED = 10  # losses in the text of the new bag
+LOST_BEFORE = 'lost before the repair'  # key in the `custom_data` of the new bag
 
 
 def repair(
@@ -81,8 +83,25 @@ def repair(
         kept=repairer.kept,
         attachments=repairer.attachments,
         losses=tuple(repairer.losses),
+        unknown=tuple(_unknown(folder, all_contents)),
         mended=tuple(repairer.mended),
     )
+
+
+def _unknown(folder: BagFolder, all_contents: Sequence[Contents]) -> Iterator[str]:
+    """Yield what may have been lost without a trace."""
+    for c in all_contents:
+        if not c.closed and (c.chunks or c.channels):
+            yield f'{c.path.name} has no end: what was not on the disk when its recorder ended'
+    if folder.metadata is None and folder.path.is_dir():
+        yield f'without {metadata.FILE_NAME}: whether files followed the last'
+
+
+def _noted(losses: Sequence[Loss]) -> str:
+    """Return what the new bag says of the losses of the old one."""
+    more = len(losses) - _MOST_NOTED
+    texts = [str(loss) for loss in losses[:_MOST_NOTED]] + [f'{more} more'] * (more > 0)
+    return '; '.join(texts)
 
 
 def _refuse_nothing(source: Path, all_contents: Sequence[Contents], losses: list[Loss]) -> None:
@@ -126,7 +145,11 @@ class _Repairer:
         self._contents = all_contents
         self._made = made
         self._progress = progress
-        self._plan = RepairPlan(reported(all_contents, folder), all_contents)
+        about = reported(all_contents, folder)
+        lost = [loss for loss in self.losses if loss.messages != 0]
+        if lost:
+            about = replace(about, custom_data={**about.custom_data, LOST_BEFORE: _noted(lost)})
+        self._plan = RepairPlan(about, all_contents)
         self._written: list[_Written] = []
 
     def run(self) -> None:

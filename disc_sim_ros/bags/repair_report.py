@@ -19,6 +19,7 @@ class RepairReport:
         kept: Messages by topic.
         attachments: How many were kept.
         losses: What is damaged or missing.
+        unknown: What may have been lost without a trace.
         mended: What was put right, a line for each file and fault.
     """
 
@@ -28,6 +29,7 @@ class RepairReport:
     kept: dict[str, int]
     attachments: int
     losses: tuple[Loss, ...]
+    unknown: tuple[str, ...] = ()
     mended: tuple[str, ...] = ()
 
     @property
@@ -60,6 +62,7 @@ class RepairReport:
                 }
                 for loss in self.losses
             ],
+            'unknown': list(self.unknown),
             'mended': list(self.mended),
         }
 
@@ -78,15 +81,17 @@ class RepairReport:
         )
         if self.losses:
             known = sum(loss.messages or 0 for loss in self.losses)
-            messages = f', {_count(known, "message")} that are known of' if known else ''
-            lines.append(f'  lost  {_count(self.bytes_lost, "byte")}{messages}')
+            amounts = [_count(self.bytes_lost, 'byte')] * bool(self.bytes_lost)
+            amounts += [f'{_count(known, "message")} that are known of'] * bool(known)
+            lines.append(f'  lost  {", ".join(amounts) or "an unknown amount"}')
             lines += [f'    {printable(str(loss))}' for loss in self.losses]
         elif self.was_whole:
             lines.append('  the bag was whole')
         else:
-            lines.append('  lost  nothing')
+            lines.append('  lost  nothing of what is there' if self.unknown else '  lost  nothing')
             if not self.mended:
-                lines.append('  mended: metadata.yaml was missing or old')
+                lines.append('  mended: metadata.yaml was missing, or not that of these files')
+        lines += [f'  not known: {printable(text)}' for text in self.unknown]
         lines += [f'  mended: {printable(text)}' for text in self.mended]
         return '\n'.join(lines)
 

@@ -185,6 +185,7 @@ def test_the_program_prints_json(killed, tmp_path):
         'attachments': 1,
         'bytes_lost': 0,
         'losses': [],
+        'unknown': ['killed_1.mcap has no end: what was not on the disk when its recorder ended'],
         'mended': [
             'killed_1.mcap: it was damaged or had no end',
         ],
