@@ -73,6 +73,8 @@ class Loss(StrEnum):
     DROPPED = 'dropped'
     LOST = 'lost'
     GAPS = 'gaps'
+    ENDED = 'publishers ended around a stall'  # what they sent last may be lost, uncounted
+    STALL = 'stood still'  # without a topic: how long the recorder did not run
     NOT_RECORDED = 'not recorded'
 
 

@@ -83,6 +83,11 @@ nothing; a default name that is taken gets a number, such as `_2`.
   repeats only what it still has, every 3 s. At load 16 on two cores, `sim_node` at 1 kHz kept
   2000 messages of each topic, and in three runs 2, 2 and 33 of 260,917, 254,513 and 256,013
   messages were lost; each was reported.
+  These numbers are lower bounds: a gap shows with the next message of its publisher. What no
+  number shows is told as well: `stood still` (this process did not run for more than 0.5 s),
+  `publishers ended around a stall` (the middleware may have discarded what they sent last), and in
+  the last line how many messages were sent before the subscriptions. "Nothing lost" stands there
+  otherwise.
   Once a second `/diagnostics` also reports the amounts recorded and waiting, the greatest delay
   before a message was taken, and the free space on the disk.
 - **Two recorders.** A second recorder of the same name writes another bag, and both warn.

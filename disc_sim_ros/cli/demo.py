@@ -223,7 +223,8 @@ def _report(bag: Path, plot: Path, system: System) -> int:
 
     opened = open_bag(bag)
     disc = recording.discs(opened, f'/{topics.ODOM}')[0]
-    analyses = [bag_analysis.analyse(f) for f in flights.flights(disc)]
+    doubts = bag_analysis.doubts_of(opened)
+    analyses = [bag_analysis.analyse(f, doubts) for f in flights.flights(disc)]
     if not analyses:
         raise DiscSimError(f'{bag}: the bag does not hold the throw')
     title = bag_report.title(analyses[0], system)
@@ -231,13 +232,12 @@ def _report(bag: Path, plot: Path, system: System) -> int:
     output.write_whole('--bag', str(plot), image)
     page = _page(bag, plot.with_suffix('.html'), analyses, system)
     size = sum(file.stat().st_size for file in opened.files)
-    losses = bag_analysis.losses(opened.custom_data)
     filled = sum(info.message_count > 0 for info in opened.topics)
     lines = [
         bag_report.summary(analyses[0], system),
         bag_report.verification_text(analyses[0]),
         f'recorded {opened.message_count} messages of {filled} topics, {size / 1e6:.1f} MB, '
-        + (', '.join(f'{key}: {value}' for key, value in losses) or 'nothing lost'),
+        + (', '.join(doubts) or 'nothing lost'),
     ]
     lines += [
         f'  {bag}',

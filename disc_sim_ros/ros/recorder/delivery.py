@@ -6,6 +6,7 @@ import threading
 
 from disc_sim_ros.bags.transforms import tf_message
 from disc_sim_ros.ros.recorder.clock import LogClock
+from disc_sim_ros.ros.recorder.stall_watch import StallWatch
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
 from disc_sim_ros.ros.recorder.writer_thread import LARGEST_BACKLOG, OVERHEAD, WriterThread
 
@@ -21,6 +22,7 @@ class Delivery:
     Attributes:
         lock: Held while messages are delivered; callers of the methods hold it.
         clock: The clock of arrivals.
+        stalls: The watch of this process.
         paused: Whether messages are not recorded.
     """
 
@@ -37,6 +39,7 @@ class Delivery:
         """
         self.lock = threading.RLock()
         self.clock = LogClock()
+        self.stalls = StallWatch()
         self.paused = paused
         self._thread = thread
         self._simulated_time = simulated_time

@@ -11,6 +11,7 @@ from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.ros.recorder.topic_recorder import TopicRecorder
 from disc_sim_ros.topics import Loss
 
+_MOST_NAMED = 3  # topics in a part of the last line
 LITTLE_SPACE = 1024**3  # bytes free on the disk, below which there is a warning
 
 
@@ -42,6 +43,7 @@ def losses(recorders: Iterable[TopicRecorder]) -> dict[str, int]:
             (Loss.DROPPED, recorder.dropped),
             (Loss.LOST, recorder.lost),
             (Loss.GAPS, recorder.missing),
+            (Loss.ENDED, recorder.ended),
         )
         if count
     }
@@ -80,23 +82,42 @@ def diagnostic(name: str, writer: BagWriter, progress: Progress) -> DiagnosticSt
 
 
 def summary(
-    writer: BagWriter, losses: Mapping[str, int], not_recorded: Mapping[tuple[str, str], str]
+    writer: BagWriter,
+    recorders: Sequence[TopicRecorder],
+    not_recorded: Mapping[tuple[str, str], str],
+    stall: float,
 ) -> str:
     """Return the last line of a recorder: what its closed bag holds, and how to open it.
 
     Args:
         writer: The closed bag.
-        losses: Numbers of lost messages, of `losses`.
+        recorders: The recorded topics.
         not_recorded: Why the types of topics are missing, by name and type.
+        stall: Longest time that the recorder did not run [s]; 0 if it always did.
     """
     filled = sum(count > 0 for count in writer.counts.values())
-    missing = [f'{Loss.NOT_RECORDED} {name} ({kind})' for name, kind in not_recorded]
-    lost = ', '.join([*(f'{loss}: {count}' for loss, count in losses.items()), *missing])
+    known = [f'{loss}: {count}' for loss, count in losses(recorders).items()]
+    known += [f'{Loss.NOT_RECORDED} {name} ({kind})' for name, kind in not_recorded]
+    known += [f'{Loss.STALL} for {stall:.1f} s'] * bool(stall)
+    lost = f'known losses: {", ".join(known)}' if known else 'nothing lost'
+    if not recorders and not known:
+        lost = 'no topic came'
     return (
         f'recorded {_plural(writer.message_count, "message")} of {_plural(filled, "topic")}, '
-        f'{writer.bytes / 1e6:.1f} MB, {lost or "nothing lost"}, in {writer.folder} '
+        f'{writer.bytes / 1e6:.1f} MB, {lost}{_sent_before(recorders)}, in {writer.folder} '
         '(open it with analyse_bag, Foxglove or ros2 bag play)'
     )
+
+
+def _sent_before(recorders: Iterable[TopicRecorder]) -> str:
+    """Return a part of a sentence about messages that were sent before the subscriptions."""
+    early = sorted((r for r in recorders if r.before), key=lambda r: (-r.before, r.label))
+    if not early:
+        return ''
+    names = [f'{r.label} {r.before}' for r in early[:_MOST_NAMED]]
+    rest = len(early) - len(names)
+    more = f' and {_plural(rest, "more topic")}' if rest else ''
+    return f' but what was sent before its subscriptions ({", ".join(names)}{more})'
 
 
 def duplicate_names(nodes: Sequence[tuple[str, str]]) -> set[str]:

@@ -144,6 +144,7 @@ class TopicDiscovery:
                 type_name,
                 self._delivery.deliver,
                 clock=self._delivery.clock,
+                stalls=self._delivery.stalls,
             )
             try:
                 self._subscribe(recorder, publishers)

@@ -27,6 +27,7 @@ DISCOVERY_PERIOD = 0.05  # s between two looks at the graph; each takes 6 us
 DIAGNOSTIC_PERIOD = 1.0  # s
 PATIENCE = 5.0  # s, for the disk to do what a service asks
 POLLING_PERIOD = 0.01  # s between two rounds of taking messages
+HARMLESS_STALL = 0.5  # s; longer ones are told: a publisher may end or overwrite meanwhile
 POLLING_PERIOD_SIM_TIME = 0.001  # s; then a message is recorded at the time of taking it
 
 
@@ -96,6 +97,7 @@ class RecorderNode(Node):
         """Start the threads that take messages and write them."""
         self._writer_thread.start()
         self._polling_thread.start()
+        self._delivery.stalls.start()
 
     @property
     def is_working(self) -> bool:
@@ -110,6 +112,7 @@ class RecorderNode(Node):
         """
         writer, polling = self._writer_thread, self._polling_thread
         polling.end()
+        self._delivery.stalls.end()
         if writer.failure is None and polling.failure is None:
             self._record_rest()
         self._discovery.close()
@@ -118,7 +121,8 @@ class RecorderNode(Node):
         failure = writer.failure or polling.failure
         if failure is not None:
             raise failure
-        return diagnostics.summary(self.writer, self._losses(), self._discovery.refused)
+        recorders = list(self._discovery.recorders.values())
+        return diagnostics.summary(self.writer, recorders, self._discovery.refused, self._stall)
 
     def _record_rest(self) -> None:
         with self._delivery.lock:
@@ -160,8 +164,8 @@ class RecorderNode(Node):
 
     def _flush(self) -> str:
         self._discovery.drain()
-        self._writer_thread.call(BagWriter.flush).result(PATIENCE)
-        return f'{self.writer.message_count} messages are on the disk'
+        count = self._writer_thread.call(_flushed).result(PATIENCE)
+        return f'{count} messages are on the disk'
 
     # ---- diagnostics ----
 
@@ -195,15 +199,32 @@ class RecorderNode(Node):
             text = f'the wall clock was set by {shift * 1e-9:+.1f} s; log times go on without that'
             warn_once(text)
 
+    @property
+    def _stall(self) -> float:
+        """Return the longest time that this node did not run [s]; 0 for times without harm."""
+        longest = self._delivery.stalls.longest
+        return longest if longest > HARMLESS_STALL else 0.0
+
     def _losses(self) -> dict[str, int]:
         return diagnostics.losses(self._discovery.recorders.values())
 
     def _note_losses(self) -> None:
-        losses = self._losses()
+        losses, stall = self._losses(), self._stall
+        for key, count in losses.items():
+            what = '' if key.startswith(topics.Loss.ENDED) else ' messages'
+            self._discovery.warn_once(f'{key}: {count}{what}', about=key)
+        if stall:
+            text = f'for {stall:.1f} s: what was sent meanwhile may be lost'
+            self._discovery.warn_once(f'{topics.Loss.STALL} {text}', about=topics.Loss.STALL)
+            self._writer_thread.call(lambda writer: writer.custom(topics.Loss.STALL, text))
         if losses:
             self._writer_thread.call(lambda writer: _note(writer, losses))
-            for key, count in losses.items():
-                self._discovery.warn_once(f'{key}: {count} messages', about=key)
+
+
+def _flushed(writer: BagWriter) -> int:
+    """Flush; return the messages that are on the disk, without those that come meanwhile."""
+    writer.flush()
+    return writer.message_count
 
 
 def _note(writer: BagWriter, losses: Mapping[str, int]) -> None:

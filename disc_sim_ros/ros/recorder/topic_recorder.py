@@ -15,6 +15,7 @@ from rclpy.type_support import check_for_type_support
 from disc_sim_ros.ros.internals import Taken, WatchedSubscription
 from disc_sim_ros.ros.recorder.clock import LogClock
 from disc_sim_ros.ros.recorder.qos import same_request
+from disc_sim_ros.ros.recorder.stall_watch import StallWatch
 from disc_sim_ros.ros.recorder.writer_thread import BagTopic
 
 MOST_AT_ONCE = 256  # messages of one topic before the others have their turn
@@ -40,12 +41,21 @@ class TopicRecorder:
         dropped: Messages that arrived and were not recorded, because too many waited.
         lost: Messages that the middleware reported as lost.
         missing: Gaps in the sequence numbers of the only publisher.
+        before: Messages that the only publisher had sent before the subscription was matched.
+        ended: Publishers that ended while this process stood still, or just after that.
         is_late: The topic was recorded before with another type: what its publisher sent until
             the subscription was matched is missing as well.
     """
 
     def __init__(
-        self, node: Node, name: str, type_name: str, deliver: Deliver, *, clock: LogClock
+        self,
+        node: Node,
+        name: str,
+        type_name: str,
+        deliver: Deliver,
+        *,
+        clock: LogClock,
+        stalls: StallWatch,
     ) -> None:
         """Prepare to record; `subscribe` begins.
 
@@ -55,6 +65,7 @@ class TopicRecorder:
             type_name: Its type, such as 'nav_msgs/msg/Odometry'.
             deliver: Called with each message.
             clock: The clock of arrivals.
+            stalls: The watch of this process.
 
         Raises:
             ImportError: The type is not installed.
@@ -65,11 +76,14 @@ class TopicRecorder:
         self.tf_topic: BagTopic | None = None
         self.publisher_count = 0
         self.received = self.dropped = self.lost = self.missing = 0
+        self.before = self.ended = 0
         self.is_late = False
+        self._is_new = True  # nothing was received yet of the only publisher
         self._type = message_type(type_name)
         self._node = node
         self._deliver = deliver
         self._clock = clock
+        self._stalls = stalls
         self._lateness = 0  # the longest since it was last reported [ns]
         self._described = 0  # publishers of the graph in the bag's description
         self._rematched = False  # since then a publisher came or left
@@ -201,6 +215,9 @@ class TopicRecorder:
         count = subscription.events.publisher_count()
         if count is None or subscription is not self._subscription:
             return False
+        if count < self.publisher_count and self._stalls.is_recent():
+            self.ended += self.publisher_count - count
+        self._is_new = self._is_new or not count
         self.publisher_count = count
         self._next_number = None
         self._rematched = True
@@ -222,8 +239,12 @@ class TopicRecorder:
         self.received += 1
         if self.publisher_count == 1 and not self._superseded:
             expected = self._next_number
-            if expected is None and self.is_late and self.received == 1 and not self.latched:
-                expected = 1  # of the first message of a publisher
+            if expected is None and self._is_new and not self.latched:
+                if self.is_late:
+                    expected = 1  # of the first message of a publisher
+                else:
+                    self.before += number - 1
+            self._is_new = False
             if expected is not None and number > expected:
                 self.missing += number - expected
             self._next_number = number + 1
