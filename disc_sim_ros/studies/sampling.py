@@ -4,7 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from disc_sim_ros.arrays import FloatArray
 
@@ -77,6 +76,8 @@ def _scrambled_basis(dimensions: int, seed: int, bits: int) -> tuple[IntArray, I
 @lru_cache(maxsize=8)
 def _sobol_basis(dimensions: int, bits: int) -> IntArray:
     """Return the direction numbers of scipy's Sobol sequence, shape (bits, dimensions)."""
+    from scipy.stats import qmc  # noqa: PLC0415 - it takes a second, and only Sobol needs it
+
     sequence = qmc.Sobol(dimensions, scramble=False)
     basis = np.zeros((bits, dimensions), dtype=np.int64)
     for j in range(bits):
