@@ -22,6 +22,7 @@ from disc_sim_ros.ros.recorder.polling_thread import PollingThread
 from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view.page import live_page
 
+SENT = 'sent to the simulator'  # which may still refuse it
 DISCOVERY_PERIOD = 0.5  # s between two looks at the graph
 _ODOMETRY = 'nav_msgs/msg/Odometry'
 
@@ -97,7 +98,7 @@ class LiveViewNode(Node):
         return False
 
     def _throw(self, values: dict[str, Any]) -> str:
-        """Throw a disc with the launch of a page.
+        """Send the launch of a page; whether the simulator takes it, its log and events tell.
 
         Raises:
             ConfigError: A number is out of range.
@@ -113,7 +114,7 @@ class LiveViewNode(Node):
         launch = Launch(**{n: LAUNCH[n].check(x, n) for n, x in values.items()})
         require_above_ground(launch.height)
         disc.throw.publish(_odometry(launch, disc.frame, disc.child_frame))
-        return 'thrown'
+        return SENT
 
 
 def _odometry(launch: Launch, frame: str, child: str) -> Odometry:

@@ -158,9 +158,11 @@ class Commands:
         changes = (self.moment, self.coefficients, self.wind)
         return min((t.waiting[0][0] for t in changes if t.waiting), default=math.inf)
 
-    def clear(self) -> None:
-        """Discard all waiting commands."""
+    def clear(self, reason: str) -> None:
+        """Drop all waiting commands."""
         for topic in self.all:
+            for _ in topic.waiting:
+                topic.drop_accepted(reason)
             topic.waiting.clear()
 
 

@@ -9,6 +9,7 @@ from disc_sim_ros.ros.sim.simulation import FAR
 from disc_sim_ros.units import NANOSECONDS
 
 LATE = 0.01  # s; a worse lateness in a period is a warning
+STUCK = 0.3  # s without a step; of its last 0.1 s the thread has not told
 
 
 class SimDiagnostics:
@@ -39,6 +40,8 @@ class SimDiagnostics:
         problems = []
         if worst > LATE:
             problems.append(f'up to {worst * 1e3:.1f} ms late')
+        if (overdue := self._overdue()) > STUCK:
+            problems.append(f'no step for {overdue:.1f} s')
         if dropped > self._dropped:
             problems.append(f'{dropped - self._dropped} commands dropped')
         self._dropped = dropped
@@ -75,7 +78,19 @@ class SimDiagnostics:
         return DiagnosticStatus(
             level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
             name=self._name,
-            message=', '.join(problems) or ('paused' if loop.paused else 'in time'),
+            message=', '.join(problems) or self._no_problem(),
             hardware_id=self._hardware_id,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+    def _overdue(self) -> float:
+        """Return how late the next step is [s]; 0 or less if it is not due."""
+        loop = self._loop
+        if loop.paused or loop.config.real_time_factor == 0.0:
+            return 0.0
+        return -loop.pacer.wait(time.monotonic(), 1)
+
+    def _no_problem(self) -> str:
+        if self._loop.paused:
+            return 'paused'
+        return 'in time' if self._loop.config.real_time_factor else 'as fast as possible'

@@ -64,8 +64,8 @@ class Inputs:
             self.set_wind(replace(self.wind, mean=mean), flight)
 
     def reset(self, wind: Wind) -> None:
-        """Discard all commands and control inputs, and set the wind; there is no flight."""
-        self._commands.clear()
+        """Drop all commands and control inputs, and set the wind; there is no flight."""
+        self._commands.clear('a reset came before its time')
         self._set_moment(_NO_MOMENT, math.inf, None)
         self._set_coefficients(_NO_COEFFICIENTS, math.inf, None)
         self.set_wind(wind, None)

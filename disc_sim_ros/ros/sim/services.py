@@ -21,8 +21,8 @@ def create_services(node: Node, loop: SimLoop) -> None:
             response.message = future.result(PATIENCE)
             response.success = True
         except TimeoutError:
-            future.cancel()
-            response.message = f'the simulation did not answer within {PATIENCE:g} s'
+            late = '' if future.cancel() else ', but has begun to act'
+            response.message = f'the simulation did not answer within {PATIENCE:g} s{late}'
         except DiscSimError as error:
             response.message = str(error)
         return response

@@ -27,6 +27,7 @@ from disc_sim_ros import Launch, Setup, fly, load_disc, topics
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.ros.live import discs
+from disc_sim_ros.ros.live.node import SENT
 from disc_sim_ros.ros.live.options import live_config
 from disc_sim_ros.ros.live.server import LiveServer
 from ros.sim_process import DEADLINE
@@ -204,10 +205,23 @@ def states(viewer, until) -> list[dict]:
     return received
 
 
+def test_a_launch_that_the_simulator_refuses_is_not_called_thrown(ros, live):
+    """It is in the range of the page, and too fast for the steps of this simulator."""
+    slow = {'auto_throw': False, 'physics_rate': 50.0, 'publish_rate': 50.0}
+    sim = ros.start(slow)
+    _, address = live
+    token = address.partition('#')[2]
+    with connect(socket_of(address)) as viewer:
+        throw_when_ready(viewer, token)
+        said = answer(viewer, disc='', token=token, **THROW | {'spin': 1000.0})
+    ros.spin_until(lambda: 'throw dropped' in sim.stderr, 'the refusal')
+    assert said == SENT
+
+
 def throw_when_ready(viewer, token: str) -> None:
     """Throw as soon as the simulator and live_view have discovered each other."""
     end = time.monotonic() + DEADLINE
-    while (said := answer(viewer, disc='', token=token, **THROW)) != 'thrown':
+    while (said := answer(viewer, disc='', token=token, **THROW)) != SENT:
         assert said == 'error: no simulator takes throws for this disc'
         assert time.monotonic() < end
         time.sleep(0.1)
@@ -251,7 +265,7 @@ def test_the_button_throws_and_the_page_shows_it(ros, live):
     with browser.Browser(700, 700) as tab:
         tab.open(address)
         tab.wait('discView.ready')
-        tab.wait('discView.throws() === "thrown"')
+        tab.wait(f'discView.throws() === "{SENT}"')
         tab.wait('discView.flights.length === 1 && discView.time > 0.5')
         first = tab.value('discView.pose(0).position')
         tab.wait(f'discView.pose(0).position[0] > {first[0] + 2.0}')
