@@ -58,7 +58,7 @@ class Threads:
         """End the threads."""
         self.close()
 
-    def run(self, work: Iterable[Callable[[], _T]]) -> list[_T]:
+    def run(self, work: Iterable[Callable[[], _T]], *, leave: bool = False) -> list[_T]:
         """Call functions side by side, and return their results in their order.
 
         After Ctrl-C or an error no more of them begin. It is raised when those that run have
@@ -66,6 +66,8 @@ class Threads:
 
         Args:
             work: The functions.
+            leave: Wait for none of them after Ctrl-C or an error: they take long, and what they
+                still do changes nothing that the caller uses.
 
         Raises:
             BaseException: One of the functions raised it.
@@ -80,7 +82,7 @@ class Threads:
                 run.await_one()
         except BaseException:
             run.stop = True
-            while len(run.ends) < len(run.starts):
+            while not leave and len(run.ends) < len(run.starts):
                 with suppress(Empty):
                     run.done.get(timeout=0.1)
             raise

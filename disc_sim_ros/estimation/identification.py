@@ -267,7 +267,7 @@ def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, Floa
         return result
 
     with Threads(most=len(problem.throws)) as pool:
-        fitted = pool.run(partial(start, k) for k in range(len(problem.throws)))
+        fitted = pool.run((partial(start, k) for k in range(len(problem.throws))), leave=True)
     problem = replace(problem, throws=tuple(alone.throw for alone in fitted))
     x = problem.means.copy()
     x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)

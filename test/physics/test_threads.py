@@ -92,3 +92,14 @@ def test_no_more_threads_than_are_of_use():
     for wanted, most, count in ((4, 2, 2), (2, None, 2), (4, 0, 1)):
         with Threads(wanted, most) as threads:
             assert threads.count == count
+
+
+def test_what_takes_long_is_left_to_itself_after_an_error():
+    go_on = threading.Event()
+
+    def fail():
+        raise ValueError('none')
+
+    with Threads(2) as threads, pytest.raises(ValueError, match='none'):
+        threads.run([go_on.wait, fail], leave=True)
+    go_on.set()
