@@ -1,4 +1,4 @@
-"""One throw, estimated from all its measurements: one or two Gauss-Newton steps for each new one.
+"""One throw, estimated from all its measurements: a few Gauss-Newton steps for each new one.
 
 A batch estimator, because a filter of this problem is overconfident (docs/predictor.md).
 """
@@ -24,9 +24,10 @@ from disc_sim_ros.estimation.throw_fit import (
 from disc_sim_ros.physics.kernels.tracking import SEEN
 
 FIRST_STEPS = 6  # Gauss-Newton steps of the first update
-# Gain in cost from which another step is made: of a move of 0.45 standard deviations. An estimate
-# that lags behind its measurements missed by 1.2 times the bound, and by 1.1 times with the step.
-_FAR = 0.1
+# Gain in cost from which another step is made: that of a move of 0.2 standard deviations. One step
+# lags behind the measurements, and more than four cost more time than they gain.
+_FAR = 0.02
+_MOST_MORE = 3
 _FIRST_VELOCITY = 1.0  # m/s, with which the first derivatives are taken
 _FIRST_LIFT = 5.0  # m/s^2
 _LOST = 4.0  # scale of the residuals from which the throw is fitted from the beginning
@@ -55,8 +56,8 @@ class ThrowEstimator:
 
         Args:
             data: All measurements so far, the first at time 0.
-            steps: Gauss-Newton steps, and one more if the last of them led far; the first update
-                makes more.
+            steps: Gauss-Newton steps, and up to three more while the last led far; the first
+                update makes more.
         """
         model = self._model
         if self.fitted is None or self._scale[0] > _LOST or not math.isfinite(self.fitted.cost):
@@ -64,7 +65,7 @@ class ThrowEstimator:
             steps = FIRST_STEPS
         else:
             estimate = self.fitted.estimate
-        for k in range(1, steps + 2):
+        for k in range(1, steps + _MOST_MORE + 1):
             duration = model.duration if k >= steps else 0.0
             self.linear, step, self._scale = linearised(model, estimate, self._spread, data)
             self.fitted = best_on_line(model, estimate, step, data, self._scale, duration)
