@@ -1,12 +1,13 @@
 """Storage of an unfinished sweep: a folder of finished batches that outlives the process.
 
-Each part is a complete Parquet file, or an NPZ file without pyarrow, that appears by a rename. If
-the process is killed, or the disk is full, or the power fails, only the batches in progress are
-lost. The manifest holds the study.
+Each part is a complete Parquet file, or an NPZ file without pyarrow, that appears by a rename; its
+digest is beside it. If the process is killed, or the disk is full, or the power fails, only the
+batches in progress are lost. The manifest holds the study.
 """
 
 from contextlib import suppress
 import fcntl
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -99,8 +100,10 @@ class Parts:
         Raises:
             DiscSimError: The system refuses, for instance for lack of space.
         """
+        content = tables.part_bytes(columns)
         try:
-            write_whole(self.path(number), tables.part_bytes(columns))
+            write_whole(self.path(number), content)
+            write_whole(self._digest_path(number), _digest(number, content))
         except OSError as error:
             raise DiscSimError(f'cannot write {self.path(number)} ({reason(error)})') from None
         self.done.add(number)
@@ -195,9 +198,24 @@ class Parts:
                 raise ConfigError('resume', str(self.output), allowed)
             if match and number < self.batches:
                 start, stop = self.span(number)
-                if tables.rows_of(path) == stop - start:
+                if tables.rows_of(path) == stop - start and self._is_as_kept(number):
                     complete.add(number)
                     continue
             if match or path.suffix == '.part':
                 path.unlink()
         return complete
+
+    def _digest_path(self, number: int) -> Path:
+        return self.folder / f'{number:010d}.sha256'
+
+    def _is_as_kept(self, number: int) -> bool:
+        """Return True if a part has the content with which it was written, under its number."""
+        try:
+            kept = self._digest_path(number).read_bytes()
+            return kept == _digest(number, self.path(number).read_bytes())
+        except OSError:
+            return False
+
+
+def _digest(number: int, content: bytes) -> bytes:
+    return hashlib.sha256(f'{number} '.encode() + content).hexdigest().encode()
