@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.estimation.predictor import Measurement, PredictorConfig
     from disc_sim_ros.estimation.replay import FollowedThrow
 
+_STALE = 0.1  # s; a prediction that is older than its row is told
 WATCHED = (0.3, 0.5, 1.0, 1.5, 2.0)  # s, rows of the summary
 LEAST_MISS = 0.01  # m, lower end of the axis of the plot
 _FLAGS = {name: f'--{name.replace("_", "-")}' for name in PREDICTION}
@@ -154,22 +155,26 @@ def _of_bag(source: Path, topic: str | None) -> 'list[Measurement]':
     return replay.measurements(time, motion.position, quaternion)
 
 
-def _rows(throw: 'FollowedThrow') -> list[dict[str, float]]:
-    rows = []
+def _rows(throw: 'FollowedThrow') -> list[dict[str, float | None]]:
+    """Return what was known at some times; where no landing was measured, no miss is known."""
+    rows: list[dict[str, float | None]] = []
     for watched in WATCHED:
         p = throw.at(watched)
         if p is None or throw.watched[-1] < watched:
             continue
         variances = p.covariance[:2, :2].diagonal()
+        from_last = float(((p.landing - throw.landing[:2]) ** 2).sum()) ** 0.5
         rows.append(
             {
                 'watched_s': watched,
+                'measured_until_s': p.time - p.reference_time,
                 'x_m': float(p.landing[0]),
                 'y_m': float(p.landing[1]),
                 'landing_s': p.landing_time - p.reference_time,
                 'sigma_x_m': float(variances[0]) ** 0.5,
                 'sigma_y_m': float(variances[1]) ** 0.5,
-                'miss_m': float(((p.landing - throw.landing[:2]) ** 2).sum()) ** 0.5,
+                'from_last_m': from_last,
+                'miss_m': from_last if throw.is_complete else None,
             }
         )
     return rows
@@ -193,19 +198,29 @@ def _document(throw: 'FollowedThrow', discs: Sequence[str]) -> dict[str, Any]:
 def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
     x, y, time = throw.landing
     last = throw.predictions[-1]
+    whole = throw.is_complete
     lines = [
-        f'throw {throw.number}: measured from {last.reference_time:.3f} s, lands at '
+        f'throw {throw.number}: measured from {last.reference_time:.3f} s, '
+        f'{"lands" if whole else "would land"} at '
         f'x {x:.2f} m, y {y:.2f} m after {time - last.reference_time:.2f} s'
     ]
-    if not throw.is_complete:
+    if not whole:
         left = last.landing_time - last.time
-        lines.append(f'  the measurements end {left:.2f} s before the landing')
-    lines.append('  watched s   x m      y m      sigma x, y m     miss m')
-    lines += [
-        f'  {r["watched_s"]:8.1f}  {r["x_m"]:7.2f}  {r["y_m"]:7.2f}  '
-        f'{r["sigma_x_m"]:7.2f} {r["sigma_y_m"]:7.2f}  {r["miss_m"]:9.2f}'
-        for r in _rows(throw)
-    ]
+        lines.append(
+            f'  the measurements end {left:.2f} s before the landing, so no miss is known'
+        )
+    distance = ' miss m' if whole else 'from the last m'
+    lines.append(f'  watched s   x m      y m      sigma x, y m    {distance}')
+    for row in _rows(throw):
+        r = {name: x for name, x in row.items() if x is not None}
+        until = r['measured_until_s']
+        stale = until < r['watched_s'] - _STALE
+        lines.append(
+            f'  {r["watched_s"]:8.1f}  {r["x_m"]:7.2f}  {r["y_m"]:7.2f}  '
+            f'{r["sigma_x_m"]:7.2f} {r["sigma_y_m"]:7.2f}  {r["from_last_m"]:9.2f}'
+            + f'  nothing measured since {until:.2f} s'
+            * stale
+        )
     lines.append(f'  estimated wind {last.wind[0]:.1f}, {last.wind[1]:.1f} m/s')
     if len(discs) > 1:
         likely = sorted(
@@ -228,7 +243,8 @@ def _figure(throws: 'Sequence[FollowedThrow]') -> 'Figure':
     axis = figure.add_subplot()
     for i, throw in enumerate(throws):
         colour = COLOURS[i % len(COLOURS)]
-        label = f'throw {throw.number}: miss of the predicted landing'
+        of = 'landing' if throw.is_complete else 'last prediction: it was measured in part'
+        label = f'throw {throw.number}: miss of the {of}'
         axis.semilogy(throw.watched, throw.misses, color=colour, label=label)
         sigma = [float(p.covariance[:2, :2].trace()) ** 0.5 for p in throw.predictions]
         label = f'throw {throw.number}: standard deviation that the predictor states'
