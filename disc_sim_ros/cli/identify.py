@@ -273,7 +273,11 @@ def _prior(chosen: argparse.Namespace) -> 'Prior':
 
 
 def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
-    from disc_sim_ros.estimation.measured import Instruments, throw_from  # noqa: PLC0415
+    from disc_sim_ros.estimation.measured import (  # noqa: PLC0415
+        Instruments,
+        check_different,
+        throw_from,
+    )
     from disc_sim_ros.estimation.throw_csv import GROUPS  # noqa: PLC0415
 
     instruments = Instruments(
@@ -286,14 +290,19 @@ def _throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
     for name in used:
         validation.choice('--use', name, GROUPS)
     measured: dict[str, dict] = {}  # type: ignore[type-arg]
-    for source in chosen.throws:
+    names = [Path(source).name for source in chosen.throws]
+    for source, short in zip(chosen.throws, names, strict=True):
+        of = short if names.count(short) == 1 else source  # files of two folders
         for number, columns in _read(source).items():
             name = f'throw {number}' if number.isdigit() else number
-            full = name if len(chosen.throws) == 1 else f'{Path(source).name} {name}'
+            full = name if len(chosen.throws) == 1 else f'{of} {name}'
+            if full in measured:
+                raise ConfigError('throws', source, 'it is given twice')
             measured[full] = {k: v for k, v in columns.items() if k in {*used, 'camera'}}
             if not measured[full]:
                 allowed = f'it has {", ".join(columns) or "nothing"}, --use {",".join(used)}'
                 raise ConfigError('throws', full, allowed)
+    check_different(measured)
     releases = _releases(chosen, len(measured))
     return [
         throw_from(name, columns, setup.disc, instruments, release)

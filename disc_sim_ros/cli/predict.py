@@ -206,9 +206,7 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
     ]
     if not whole:
         left = last.landing_time - last.time
-        lines.append(
-            f'  the measurements end {left:.2f} s before the landing, so no miss is known'
-        )
+        lines.append(f'  the measurements end {left:.2f} s before the landing: no miss is known')
     distance = ' miss m' if whole else 'from the last m'
     lines.append(f'  watched s   x m      y m      sigma x, y m    {distance}')
     for row in _rows(throw):

@@ -1,6 +1,8 @@
 """Measurements as throws: checked, cut to the time in the air, in the paper's axes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -45,6 +47,22 @@ class Instruments:
     camera_height: float | None = None
     largest_acceleration: float = float('inf')
     spin: float | None = None
+
+
+def check_different(measured: Mapping[str, Columns]) -> None:
+    """Refuse a throw that is given twice: it would count as two, and as its own check.
+
+    Args:
+        measured: The measurements of each throw by its name.
+
+    Raises:
+        ConfigError: An instrument has the same values in two throws.
+    """
+    for (a, first), (b, second) in combinations(measured.items(), 2):
+        same = [k for k in first if k in second and np.array_equal(first[k][1], second[k][1])]
+        if same:
+            allowed = f'their {same[0]} is the same; give each throw once'
+            raise ConfigError('throws', f'{a} and {b}', allowed)
 
 
 def throw_from(

@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -144,6 +145,26 @@ RELEASES = """speedMps,spinRpm,launchAngle,noseAngle,hyzerAngle,throwType
 24.7,1317.8,15.5,0.0,21.8,rhbh
 24.5,1410.4,5.2,0.0,-0.7,rhbh
 """
+
+
+def test_a_throw_that_is_given_twice_is_refused(throw, tmp_path, capsys):
+    """Errors would be too small, and "a throw that was not used" would be one that was."""
+    assert 'it is given twice' in refused(capsys, str(throw), str(throw))
+    copy = tmp_path / 'copy.csv'
+    shutil.copy(throw, copy)
+    said = refused(capsys, str(throw), str(copy))
+    assert 'one.csv one and copy.csv copy' in said
+    assert 'their position is the same; give each throw once' in said
+
+
+def test_files_of_one_name_in_two_folders_are_two_throws(throw, tmp_path, capsys):
+    other = tmp_path / throw.name
+    head, *rows = throw.read_text().splitlines()
+    other.write_text('\n'.join([head, *rows[:-3]]) + '\n')  # another one, a little shorter
+    words = [str(throw), str(other), '--disc', 'ultrastar', '--free', 'C_D0', '--spin', '60']
+    assert identify.main([*words, '--starts', '1', '--json']) == 0
+    names = json.loads(capsys.readouterr().out)['throws']
+    assert names == [f'{throw} one', f'{other} one']
 
 
 def test_each_throw_needs_a_row_of_the_releases(throw, tmp_path, capsys):
