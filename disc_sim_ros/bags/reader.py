@@ -113,7 +113,8 @@ class Bag:
                 None for all.
 
         Raises:
-            BagError: A part of a file is damaged that was not known to be.
+            DamageError: A part of a file is damaged that was not known to be.
+            BagError: A file cannot be read.
         """
         for name, number, stored in self._stored(names, types):
             data = self._plain(number, stored)
@@ -155,7 +156,7 @@ class Bag:
         try:
             return decompress_zstd(data)
         except DamageError as error:
-            raise BagError(
+            raise DamageError(
                 f'{contents.path}: the message at {stored.log_time} ns is damaged ({error})'
             ) from None
 
@@ -322,8 +323,8 @@ def _messages(path: Path, file: BinaryIO, chunk: Chunk, ids: frozenset[int]) -> 
         raise BagError(f'{path}: cannot be read ({reason(error)})') from None
 
 
-def _damage(path: Path, offset: int, error: DamageError) -> BagError:
-    return BagError(
+def _damage(path: Path, offset: int, error: DamageError) -> DamageError:
+    return DamageError(
         f'{path}: damaged at byte {offset} ({error}); `repair_bag` makes a bag of all the rest'
     )
 

@@ -13,7 +13,7 @@ from disc_sim_ros import __version__
 from disc_sim_ros.cli import output, pages
 from disc_sim_ros.cli.arguments import Parser, path
 from disc_sim_ros.cli.main import BAD_INPUT, DIFFERENT, run_program
-from disc_sim_ros.errors import BagError, ConfigError, DiscSimError, printable
+from disc_sim_ros.errors import BagError, ConfigError, DamageError, DiscSimError, printable
 from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ def parser(prog: str = 'analyse_bag') -> Parser:
         'how complete the recording is. Reads bags of sim_node and any MCAP bag with '
         'nav_msgs/Odometry or geometry_msgs/PoseStamped. Angles are in degrees with the signs of '
         'Crowther & Potts (2007); positions are in map axes: x forward, y left, z up.',
-        epilog='Exit code 0; 1: the bag is damaged; 2: bad input; 3: --verify found a difference, '
+        epilog='Exit code 0, after a note if the end of the bag is missing; 1: the bag is damaged '
+        'in the middle; 2: bad input; 3: --verify found a difference, a throw without its motion, '
         'or nothing to verify.',
     )
     p.set_defaults(prog=prog, outputs={'plot': output.check_plot, **pages.CHECKS})
@@ -78,6 +79,8 @@ def _run(chosen: argparse.Namespace) -> int:
     try:
         bag = open_bag(chosen.bag)
         discs = recording.discs(bag, getattr(chosen, 'topic', None))
+    except DamageError:
+        raise  # a program that failed, not bad input
     except BagError as error:
         output.note(chosen.prog, f'error: {error}')
         return BAD_INPUT
@@ -110,12 +113,17 @@ def _run(chosen: argparse.Namespace) -> int:
             output.note(chosen.prog, line)
         else:
             output.show(line)
-    if not chosen.verify:
-        return 0
-    if not every:
-        output.note(chosen.prog, 'note: there is no flight to verify')
-    unseen = any(flights.unseen_throws(disc) for disc in discs)
-    return 0 if every and not unseen and all(a.passed for a in every) else DIFFERENT
+    return _verified(chosen.prog, discs, every) if chosen.verify else 0
+
+
+def _verified(prog: str, discs: 'Sequence[Disc]', analyses: 'Sequence[Analysis]') -> int:
+    """Return the exit code of --verify."""
+    from disc_sim_ros.analysis.flights import unseen_throws  # noqa: PLC0415
+
+    if not analyses:
+        output.note(prog, 'note: there is no flight to verify')
+    seen = analyses and not any(unseen_throws(disc) for disc in discs)
+    return 0 if seen and all(a.passed for a in analyses) else DIFFERENT
 
 
 def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 
 import pytest
 
@@ -150,3 +151,16 @@ def test_a_reset_that_no_event_tells_is_the_reason_of_a_difference(verify, part)
     code, out = verify(part(lambda m: m.topic != '/flight_events'))
     assert code == 3
     assert 'because: the event of the throw is missing, and so may be others' in out
+
+
+def test_the_exit_code_of_a_damaged_bag_is_the_one_that_help_names(steered, tmp_path, capsys):
+    """1 for a byte that changed; 0 after a note for an end that is cut off."""
+    for name, damage, code, said in (
+        ('flipped', lambda b: b[:4000] + bytes([b[4000] ^ 0xFF]) + b[4001:], 1, 'damaged at byte'),
+        ('cut', lambda b: b[: len(b) * 2 // 3], 0, 'note: .* was not closed or is damaged'),
+    ):
+        bag = shutil.copytree(steered, tmp_path / name)
+        (file,) = bag.glob('*.mcap')
+        file.write_bytes(damage(file.read_bytes()))
+        assert analyse_bag.main([str(bag)]) == code
+        assert re.search(said, capsys.readouterr().err)
