@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import signal
 import threading
+from types import FrameType
 from typing import Protocol
 
 
@@ -36,6 +37,42 @@ def ended_by_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+_AGAIN = 0.01  # s from a look whether an import has ended to the next
+_IMPORT = {'importlib._bootstrap', '_frozen_importlib'}  # the module of the import statement
+
+
+def _interrupt(_: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt; within an import, look again a little later.
+
+    Packages that import what they may do without catch every exception, such as trimesh and numba:
+    Ctrl-C was lost there.
+    """
+    while frame is not None:
+        if frame.f_globals.get('__name__') in _IMPORT:
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupts_after_imports() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt outside imports alone, where Python would raise it."""
+    if signal.getsignal(signal.SIGINT) != signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, _interrupt)
+    signal.signal(signal.SIGALRM, _interrupt)
+    waiting = False
+    try:
+        yield
+    finally:
+        waiting = signal.setitimer(signal.ITIMER_REAL, 0.0)[0] > 0.0
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if waiting:
+        raise KeyboardInterrupt
+
+
 def run(load: Callable[[], Callable[[], int]]) -> int:
     """Import a program, run it and return its exit code; Ctrl-C never shows a traceback.
 
@@ -45,7 +82,8 @@ def run(load: Callable[[], Callable[[], int]]) -> int:
     try:
         with ended_by_ctrl_c():
             main = load()
-        return main()
+        with _interrupts_after_imports():
+            return main()
     except KeyboardInterrupt:
         return 128 + signal.SIGINT
     finally:

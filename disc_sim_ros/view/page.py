@@ -9,6 +9,7 @@ from typing import Any
 from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.quantities import LAUNCH
+from disc_sim_ros.threads import ctrl_c_waits
 from disc_sim_ros.units import System
 from disc_sim_ros.view import predicted
 from disc_sim_ros.view.shown import MOST_SAMPLES, ShownFlight, curve_labels, document
@@ -105,16 +106,17 @@ def viewer() -> str:
         ViewerMissingError: trimesh is missing or has the wrong version.
     """
     wanted = f'trimesh {TRIMESH[0]} (pip install "trimesh>={TRIMESH[0]},<{TRIMESH[1]}")'
-    try:
-        import trimesh  # noqa: PLC0415 - optional
-        from trimesh.viewer.notebook import scene_to_html  # noqa: PLC0415
+    with ctrl_c_waits():  # trimesh takes KeyboardInterrupt for a missing or unsuitable part
+        try:
+            import trimesh  # noqa: PLC0415 - optional
+            from trimesh.viewer.notebook import scene_to_html  # noqa: PLC0415
 
-        from disc_sim_ros.view import shape  # noqa: PLC0415 - imports trimesh
-    except ImportError as error:
-        raise ViewerMissingError(f'a page needs {wanted}: {error}') from None
-    if not TRIMESH[0] <= int(str(trimesh.__version__).partition('.')[0]) < TRIMESH[1]:
-        raise ViewerMissingError(f'a page needs {wanted}, not {trimesh.__version__}')
-    return str(scene_to_html(shape.scene()))
+            from disc_sim_ros.view import shape  # noqa: PLC0415 - imports trimesh
+        except ImportError as error:
+            raise ViewerMissingError(f'a page needs {wanted}: {error}') from None
+        if not TRIMESH[0] <= int(str(trimesh.__version__).partition('.')[0]) < TRIMESH[1]:
+            raise ViewerMissingError(f'a page needs {wanted}, not {trimesh.__version__}')
+        return str(scene_to_html(shape.scene()))
 
 
 def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
