@@ -122,8 +122,8 @@ def _verified(prog: str, discs: 'Sequence[Disc]', analyses: 'Sequence[Analysis]'
 
     if not analyses:
         output.note(prog, 'note: there is no flight to verify')
-    seen = analyses and not any(unseen_throws(disc) for disc in discs)
-    return 0 if seen and all(a.passed for a in analyses) else DIFFERENT
+    complete = analyses and not any(unseen_throws(disc) for disc in discs)
+    return 0 if complete and all(a.passed for a in analyses) else DIFFERENT
 
 
 def _chosen_discs(discs: 'list[Disc]', name: str | None) -> 'list[Disc]':
