@@ -362,7 +362,7 @@ class BagWriter:
         why = self._reason(error)
         self._failure = WriteError(
             f'{self._file.path}: cannot be written ({why}); '
-            f'{self.message_count} messages are kept, {self.lost} are lost',
+            f'{self.message_count} messages are kept, {self.lost} and what came after are lost',
             why,
         )
         return self._failure

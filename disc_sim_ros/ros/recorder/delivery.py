@@ -24,6 +24,7 @@ class Delivery:
         clock: The clock of arrivals.
         stalls: The watch of this process.
         paused: Whether messages are not recorded.
+        skipped: Messages that came while paused and are not recorded.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Delivery:
         self.clock = LogClock()
         self.stalls = StallWatch()
         self.paused = paused
+        self.skipped = 0
         self._thread = thread
         self._simulated_time = simulated_time
         self._waiting: list[_Message] = []  # for the first `/clock`
@@ -57,6 +59,8 @@ class Delivery:
         if self.paused:
             if recorder.latched:
                 self._keep_latched(recorder, data, received, sent)
+            else:
+                self.skipped += 1
             return
         if self._simulated_time is not None:
             now = self._simulated_time()

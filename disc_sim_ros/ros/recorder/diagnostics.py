@@ -85,7 +85,9 @@ def summary(
     writer: BagWriter,
     recorders: Sequence[TopicRecorder],
     not_recorded: Mapping[tuple[str, str], str],
+    *,
     stall: float,
+    skipped: int,
 ) -> str:
     """Return the last line of a recorder: what its closed bag holds, and how to open it.
 
@@ -94,6 +96,7 @@ def summary(
         recorders: The recorded topics.
         not_recorded: Why the types of topics are missing, by name and type.
         stall: Longest time that the recorder did not run [s]; 0 if it always did.
+        skipped: Messages that came while it was paused.
     """
     filled = sum(count > 0 for count in writer.counts.values())
     known = [f'{loss}: {count}' for loss, count in losses(recorders).items()]
@@ -104,20 +107,23 @@ def summary(
         lost = 'no topic came'
     return (
         f'recorded {_plural(writer.message_count, "message")} of {_plural(filled, "topic")}, '
-        f'{writer.bytes / 1e6:.1f} MB, {lost}{_sent_before(recorders)}, in {writer.folder} '
+        f'{writer.bytes / 1e6:.1f} MB, {lost}{_left_out(recorders, skipped)}, in {writer.folder} '
         '(open it with analyse_bag, Foxglove or ros2 bag play)'
     )
 
 
-def _sent_before(recorders: Iterable[TopicRecorder]) -> str:
-    """Return a part of a sentence about messages that were sent before the subscriptions."""
+def _left_out(recorders: Iterable[TopicRecorder], skipped: int) -> str:
+    """Return a part of a sentence about messages from before a subscription and from a pause."""
+    parts = []
     early = sorted((r for r in recorders if r.before), key=lambda r: (-r.before, r.label))
-    if not early:
-        return ''
-    names = [f'{r.label} {r.before}' for r in early[:_MOST_NAMED]]
-    rest = len(early) - len(names)
-    more = f' and {_plural(rest, "more topic")}' if rest else ''
-    return f' but what was sent before its subscriptions ({", ".join(names)}{more})'
+    if early:
+        names = [f'{r.label} {r.before}' for r in early[:_MOST_NAMED]]
+        rest = len(early) - len(names)
+        more = f' and {_plural(rest, "more topic")}' if rest else ''
+        parts.append(f'what was sent before its subscriptions ({", ".join(names)}{more})')
+    if skipped:
+        parts.append(f'{_plural(skipped, "message")} that came while it was paused')
+    return f' but {" and ".join(parts)}' if parts else ''
 
 
 def duplicate_names(nodes: Sequence[tuple[str, str]]) -> set[str]:

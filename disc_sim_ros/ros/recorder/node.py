@@ -122,7 +122,13 @@ class RecorderNode(Node):
         if failure is not None:
             raise failure
         recorders = list(self._discovery.recorders.values())
-        return diagnostics.summary(self.writer, recorders, self._discovery.refused, self._stall)
+        return diagnostics.summary(
+            self.writer,
+            recorders,
+            self._discovery.refused,
+            stall=self._stall,
+            skipped=self._delivery.skipped,
+        )
 
     def _record_rest(self) -> None:
         with self._delivery.lock:

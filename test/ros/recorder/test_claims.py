@@ -1,6 +1,7 @@
 """What a recorder claims at its end: "nothing lost" only where nothing is known to be missing."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import time
 import pytest
 
 pytest.importorskip('rclpy')
+
+from std_srvs.srv import Trigger
 
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.topics import Loss
@@ -106,3 +109,29 @@ def test_a_recorder_without_topics_does_not_claim_that_nothing_was_lost(record):
     recorder.wait_for_log('recording /none')
     assert recorder.end() == 0
     assert 'recorded 0 messages of 0 topics, 0.0 MB, no topic came, in' in last_line(recorder)
+
+
+def test_what_came_in_a_pause_is_told(ros, record):
+    recorder = record()
+    counter = Counter(ros, 'count')
+    recorder.wait_for_topics('/count')
+    counter.wait_for_subscriptions(1)
+    counter.publish(10)
+    pause, resume = (
+        ros.node.create_client(Trigger, f'recorder_node/{name}') for name in ('pause', 'resume')
+    )
+    ros.spin_until(lambda: pause.service_is_ready() and resume.service_is_ready(), 'the services')
+    answer(ros, pause)
+    counter.publish(25)
+    answer(ros, resume)
+    counter.publish(10)
+    assert recorder.end() == 0
+    assert counts(recorder.bag, '/count') == [*range(10), *range(35, 45)]
+    (skipped,) = re.findall(r'(\d+) messages that came while it was paused', last_line(recorder))
+    assert int(skipped) >= 25  # of /rosout there may be more
+
+
+def answer(ros, client) -> None:
+    future = client.call_async(Trigger.Request())
+    ros.spin_until(future.done, 'an answer')
+    assert future.result().success
