@@ -1,6 +1,6 @@
 """A node for programs that throw one disc: it waits for the nodes, throws and watches."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 import math
@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 
 from disc_sim_ros import topics
 from disc_sim_ros.bags import metadata
+from disc_sim_ros.bags.metadata import TopicInfo
 from disc_sim_ros.errors import BagError, DiscSimError
 from disc_sim_ros.physics.kernels.equations import Control
 from disc_sim_ros.ros import qos
@@ -122,10 +123,11 @@ class Watcher:
         self._wait(self._is_ready, START, 'the simulator and a recorder of all its topics')
         if resume:
             self._resume_recorder()
-        recorded = f'{self._namespace}/{topics.ODOM}'
-        self._wait(
-            lambda: recorded_messages(bag, recorded), START, 'the first messages in the bag'
-        )
+        odom = f'{self._namespace}/{topics.ODOM}'
+        self._wait(lambda: recorded_messages(bag, odom), START, 'the first messages in the bag')
+        # A viewer may have subscribed to topics that the recorder does not record yet, or never.
+        wanted = set(self._topics_of_the_simulator())
+        self._wait(lambda: wanted <= _recorded_topics(bag), START, 'all topics in the bag')
 
     def wait_until_followed(self) -> None:
         """Wait until a predictor follows `odom` of the simulator.
@@ -244,15 +246,20 @@ class Watcher:
         space = self._namespace or '/'
         if ('sim_node', space) not in node.get_node_names_and_namespaces():
             return False
-        names = [n for n, _ in node.get_publisher_names_and_types_by_node('sim_node', space)]
+        names = self._topics_of_the_simulator()
         last = f'{self._namespace}/{topics.APPLIED_WIND}'
         if not self._throw.service_is_ready() or last not in names:
             return False
         return all(
             any(s.node_name != _NODE_NAME for s in node.get_subscriptions_info_by_topic(name))
             for name in names
-            if name not in _NOT_OF_THE_SIMULATION
         )
+
+    def _topics_of_the_simulator(self) -> list[str]:
+        """Return the topics that the simulator publishes for all to see."""
+        space = self._namespace or '/'
+        published = self._node.get_publisher_names_and_types_by_node('sim_node', space)
+        return [name for name, _ in published if name not in _NOT_OF_THE_SIMULATION]
 
     def _wait(self, condition: Callable[[], Any], longest: float, what: str) -> None:
         end = time.monotonic() + longest
@@ -281,8 +288,16 @@ class Watcher:
 
 def recorded_messages(bag: Path, topic: str) -> int:
     """Return the number of messages of a topic that a recorder has on the disk."""
+    return sum(info.message_count for info in _listed(bag) if info.name == topic)
+
+
+def _recorded_topics(bag: Path) -> set[str]:
+    """Return the topics that a recorder has subscribed to, as its bag lists them."""
+    return {info.name for info in _listed(bag)}
+
+
+def _listed(bag: Path) -> Sequence[TopicInfo]:
     try:
-        information = metadata.parse((bag / metadata.FILE_NAME).read_text(encoding='utf-8'))
+        return metadata.parse((bag / metadata.FILE_NAME).read_text(encoding='utf-8')).topics
     except (OSError, BagError):
-        return 0
-    return sum(info.message_count for info in information.topics if info.topic.name == topic)
+        return ()

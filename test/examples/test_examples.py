@@ -102,7 +102,7 @@ def test_throw_replaces_a_flying_disc_and_reports_its_own_flight(ros):
     ros.start({'real_time_factor': 4.0, 'launch.speed': 30.0, 'launch.height': 1000.0})
     output = run('throw.py', '--speed', '15')
     assert output.splitlines() == [
-        'thrown: 15.00 m/s, spin 31.42 rad/s',
+        'thrown: 15.00 m/s, spin 31.42 rad/s; flight 1 ended in the air',
         'landed: 25.80 m in 3.682 s',
     ]
 

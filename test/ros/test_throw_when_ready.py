@@ -53,6 +53,25 @@ def test_it_throws_when_all_topics_are_recorded(ros, tmp_path):
     assert flight.starts_late < 0.006
 
 
+def test_topics_that_others_alone_have_subscribed_to_are_not_recorded(ros, tmp_path):
+    """A viewer looks at each topic; the recorder leaves out one of them."""
+    ros.start({'auto_throw': False})
+    events = ros.subscribe(DiagnosticStatus, 'flight_events')
+    bag = tmp_path / 'bag'
+    recorder = Recorder(ros, bag, {'exclude': '.*/flight_events'})
+    throw = subprocess.Popen([*COMMAND, bag])
+    try:
+        ros.spin_until(lambda: recorded_messages(bag, '/odom'), 'a recorder that works')
+        ros.spin_until(wall(3.0))
+        assert throw.poll() is None
+        assert not events
+    finally:
+        throw.kill()
+        throw.wait()
+        recorder.process.kill()
+        recorder.process.wait()
+
+
 def test_it_throws_when_a_predictor_follows(ros, tmp_path):
     """The first prediction belongs to the first flight."""
     ros.start({'auto_throw': False})
