@@ -1,5 +1,6 @@
 """The index at the end of an MCAP file: what the file holds without reading all of it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 import struct
@@ -25,6 +26,8 @@ from disc_sim_ros.errors import DamageError
 
 _FOOTER = struct.Struct('<BQQQI')  # opcode, length, start of summary, of offsets, checksum
 _TAIL = _FOOTER.size + len(MAGIC)
+_INDEX = struct.Struct('<HI')  # of a message index: channel, bytes of its entries
+_ENTRY_SIZE = 16  # bytes
 _DATA_END_SIZE = HEAD.size + 4
 _LARGEST_METADATA = 1 << 28  # bytes
 _FIRST_PRIVATE = 0x80  # opcode
@@ -102,7 +105,7 @@ class _Index:
         summary = self._summary()
         if summary is None or not summary.covers_everything():
             return False
-        if not self._walk(summary, contents):
+        if not self._walk(summary, contents) or not self._counts_agree(summary):
             return False
         contents.schemas, contents.channels = summary.schemas, summary.channels
         contents.chunks = [_chunk(c) for c in summary.chunks]
@@ -166,6 +169,28 @@ class _Index:
             at += HEAD.size + length
         return False
 
+    def _counts_agree(self, summary: _Summary) -> bool:
+        """Return False if the message indexes contradict the index of chunks or the statistics.
+
+        By the index of a chunk a reader skips it: a channel that is missing there is not read.
+        Chunks without message indexes contradict nothing.
+        """
+        totals: dict[int, int] = {}
+        for chunk in summary.chunks:
+            if not chunk.message_index_length:
+                if chunk.message_start_time or chunk.message_end_time:
+                    return True
+                continue
+            at = chunk.chunk_start_offset + chunk.chunk_length
+            size = min(chunk.message_index_length, self._size)
+            for channel_id, count in _index_counts(self._read(at, size)):
+                if count and channel_id not in chunk.message_index_offsets:
+                    return False
+                totals[channel_id] = totals.get(channel_id, 0) + count
+        assert summary.statistics is not None  # noqa: S101 - for mypy
+        counts = summary.statistics.channel_message_counts
+        return all(totals.get(i, 0) == counts.get(i, 0) for i in totals.keys() | counts.keys())
+
     def _metadata(self, index: MetadataIndex) -> Metadata:
         content = self._read(index.offset, min(index.length, _LARGEST_METADATA))
         if not content or content[0] != Opcode.METADATA:
@@ -173,6 +198,14 @@ class _Index:
         record = parsed(Metadata, content[HEAD.size :])
         assert isinstance(record, Metadata)  # noqa: S101 - for mypy
         return record
+
+
+def _index_counts(content: bytes) -> Iterator[tuple[int, int]]:
+    """Yield channel and number of entries of each message index."""
+    for kind, at, size in records(content):
+        if kind == Opcode.MESSAGE_INDEX and size >= _INDEX.size:
+            channel_id, entries = _INDEX.unpack_from(content, at)
+            yield channel_id, entries // _ENTRY_SIZE
 
 
 def _sort_in(summary: _Summary, record: McapRecord) -> None:

@@ -266,3 +266,27 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
         list(bag.messages(['/odd']))
     with pytest.raises(BagError, match='/cut at 2 ns is no std_msgs/msg/String'):
         list(bag.messages(['/cut']))
+
+
+@pytest.mark.parametrize('wrong', ['channel of a chunk', 'count'])
+def test_an_index_that_contradicts_itself_is_not_believed(tmp_path, wrong):
+    """A reader would skip messages, and call the bag complete; all checksums are right."""
+    path = tmp_path / 'a.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file, chunk_size=400)
+        writer.start('ros2')
+        schema = writer.register_schema('std_msgs/msg/String', 'ros2msg', b'string data')
+        a, b = (writer.register_channel(name, 'cdr', schema) for name in ('/a', '/b'))
+        for n in range(200):
+            writer.add_message(a if n % 2 else b, n, bytes(20), n)
+        chunks = writer._Writer__chunk_indices
+        assert len(chunks) > 10
+        if wrong == 'count':
+            counts = writer._Writer__statistics.channel_message_counts
+            counts[a], counts[b] = 90, 110
+        else:
+            del chunks[1].message_index_offsets[a]
+        writer.finish()
+    bag = open_bag(path)
+    assert {t.name: t.message_count for t in bag.topics} == {'/a': 100, '/b': 100}
+    assert sum(1 for _ in bag.raw(['/a'])) == 100
