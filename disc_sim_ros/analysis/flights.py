@@ -47,8 +47,8 @@ def _thrown(disc: Disc) -> Iterator[tuple[Release, Flight | None]]:
     """Yield each throw with its flight, None where the bag has no message of its motion."""
     stamps = disc.motion.stamps
     ends: list[int | None] = [release.stamp for release in disc.releases[1:]]
-    throws = zip(disc.releases, [*ends, None], strict=False)
-    for number, (release, following) in enumerate(throws, start=1):
+    number = 0
+    for release, following in zip(disc.releases, [*ends, None], strict=False):
         end, ended = following, THROWN_AGAIN if following else END_OF_BAG
         ending = _first(disc, ENDING, release.stamp, following)
         if ending is not None:
@@ -60,6 +60,9 @@ def _thrown(disc: Disc) -> Iterator[tuple[Release, Flight | None]]:
         if stamps[first] < release.stamp or (len(twist) and not twist.any()):
             first += 1
         last = len(stamps) if end is None else int(np.searchsorted(stamps, end, 'left'))
+        if last <= first and end == release.stamp:
+            continue  # while time stood still, or the same throw, recorded twice
+        number += 1
         if last <= first:
             yield release, None
             continue

@@ -274,7 +274,7 @@ def _disc(motion: Motion, bodies: Iterable[Motion], messages: _Messages, known: 
         motion=motion,
         releases=tuple(sorted(releases, key=_stamp)),
         events=tuple({(e.name, e.stamp, *e.values.items()): e for e in events}.values()),
-        changes=tuple(sorted(changes, key=_stamp)),
+        changes=tuple(_without_repeats(sorted(changes, key=_stamp))),
         topics=frozenset(n for n in topics.FLIGHT_TOPICS if f'{space}/{n}' in known),
         profile_changes=tuple(_profile_changes(space, messages)),
     )
@@ -286,6 +286,15 @@ def _profile_changes(space: str, messages: _Messages) -> Iterator[int]:
         names = {parameter.name for parameter in message.value.changed_parameters}
         if message.value.node.rpartition('/')[0] == space and names & set(topics.WIND_PROFILE):
             yield message.log_time
+
+
+def _without_repeats(changes: Iterable[Change]) -> Iterator[Change]:
+    """Yield changes, each once: a recorder with two subscriptions has each message twice."""
+    last: dict[str, Change] = {}
+    for change in changes:
+        if last.get(change.topic) != change:
+            yield change
+        last[change.topic] = change
 
 
 def _change(message: Message) -> Change:

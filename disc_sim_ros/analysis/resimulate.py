@@ -202,6 +202,8 @@ def _doubts(flight: Flight, again: Reflight) -> list[str]:
     unknown = {c.frame for c in flight.disc.changes if _axes_of(c, flight) is None}
     if unknown:
         doubts.append(f'moments in {", ".join(map(repr, sorted(unknown)))}: no frame of the disc')
+    if back := int((np.diff(flight.motion.stamps) < 0).sum()):
+        doubts.append(f'stamps go back {back} times: the log times are out of order')
     if again.off_grid:
         doubts.append(f'{again.off_grid} messages have stamps that are not at a step')
     if again.config.version != __version__:

@@ -164,3 +164,43 @@ def test_the_exit_code_of_a_damaged_bag_is_the_one_that_help_names(steered, tmp_
         file.write_bytes(damage(file.read_bytes()))
         assert analyse_bag.main([str(bag)]) == code
         assert re.search(said, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    'topics',
+    [
+        {'/release', '/configuration'},
+        {'/applied_wind', '/applied_coefficients', '/applied_moment'},
+        {'/flight_events'},
+    ],
+)
+def test_what_was_recorded_twice_counts_once(verify, steered, tmp_path, topics):
+    """As by two subscriptions of a recorder."""
+    bag, source = tmp_path / steered.name, open_bag(steered)
+    with BagWriter(bag) as writer:
+        ids = {i.topic.name: writer.add(i.topic) for i in source.topics}
+        for m in source.raw():
+            for _ in range(2 if m.topic in topics else 1):
+                writer.write(ids[m.topic], m.data, m.log_time, m.publish_time)
+    (once, twice) = (verify(path) for path in (steered, bag))
+    assert twice[0] == once[0] == 0
+    assert _flights(twice[1]) == _flights(once[1])
+
+
+def _flights(out):
+    """Return the report without the counts of the bag."""
+    return out[out.index('disc: /odom') :]
+
+
+def test_log_times_out_of_order_are_the_reason_of_a_difference(verify, steered, tmp_path):
+    """The clock of another recorder was set back by an hour in flight."""
+    bag, source = tmp_path / 'bag', open_bag(steered)
+    set_at, hour = bags.START + 800 * bags.MS, 3600 * bags.SECOND
+    with BagWriter(bag) as writer:
+        ids = {i.topic.name: writer.add(i.topic) for i in source.topics}
+        for m in source.raw():
+            log = m.log_time - (hour if m.log_time > set_at else 0)
+            writer.write(ids[m.topic], m.data, log, m.publish_time)
+    code, out = verify(bag)
+    assert code == 3
+    assert 'because: stamps go back 1 times: the log times are out of order' in out

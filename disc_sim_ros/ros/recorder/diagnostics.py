@@ -25,6 +25,8 @@ class Progress:
         backlog: Bytes that wait for the disk.
         lateness: Longest time that a message waited to be taken [s].
         losses: Numbers of lost messages, of `losses`.
+        refused: Why types of topics are not recorded, by name and type.
+        stall: Longest time that the recorder did not run [s]; 0 if it always did.
     """
 
     paused: bool
@@ -32,6 +34,8 @@ class Progress:
     backlog: int
     lateness: float
     losses: Mapping[str, int]
+    refused: Mapping[tuple[str, str], str]
+    stall: float
 
 
 def losses(recorders: Iterable[TopicRecorder]) -> dict[str, int]:
@@ -58,7 +62,10 @@ def diagnostic(name: str, writer: BagWriter, progress: Progress) -> DiagnosticSt
         progress: The state of the recording.
     """
     free = _free(writer.folder)
-    problems = [f'{loss}: {count}' for loss, count in progress.losses.items()]
+    problems = [
+        *(f'{loss}: {count}' for loss, count in progress.losses.items()),
+        *_without_number(progress.refused, progress.stall),
+    ]
     if free < LITTLE_SPACE:
         problems.append(f'{free / 1e6:.0f} MB left on the disk')
     values: dict[str, object] = {
@@ -100,8 +107,7 @@ def summary(
     """
     filled = sum(count > 0 for count in writer.counts.values())
     known = [f'{loss}: {count}' for loss, count in losses(recorders).items()]
-    known += [f'{Loss.NOT_RECORDED} {name} ({kind})' for name, kind in not_recorded]
-    known += [f'{Loss.STALL} for {stall:.1f} s'] * bool(stall)
+    known += _without_number(not_recorded, stall)
     lost = f'known losses: {", ".join(known)}' if known else 'nothing lost'
     if not recorders and not known:
         lost = 'no topic came'
@@ -110,6 +116,12 @@ def summary(
         f'{writer.bytes / 1e6:.1f} MB, {lost}{_left_out(recorders, skipped)}, in {writer.folder} '
         '(open it with analyse_bag, Foxglove or ros2 bag play)'
     )
+
+
+def _without_number(refused: Iterable[tuple[str, str]], stall: float) -> list[str]:
+    """Return the losses of unknown size: topics that are not recorded, and a stall [s]."""
+    texts = [f'{Loss.NOT_RECORDED} {name} ({kind})' for name, kind in refused]
+    return texts + [f'{Loss.STALL} for {stall:.1f} s'] * bool(stall)
 
 
 def _left_out(recorders: Iterable[TopicRecorder], skipped: int) -> str:

@@ -188,6 +188,8 @@ class RecorderNode(Node):
             backlog=self._writer_thread.backlog,
             lateness=max(lateness, default=0) * 1e-9,
             losses=self._losses(),
+            refused=self._discovery.refused,
+            stall=self._stall,
         )
         message = DiagnosticArray(status=[diagnostics.diagnostic(name, self.writer, progress)])
         message.header.stamp = self.get_clock().now().to_msg()

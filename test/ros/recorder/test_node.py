@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.node import Node
@@ -202,12 +202,18 @@ def test_lost_messages_are_counted_in_the_log_and_in_the_bag(ros, record):
 def test_topics_that_cannot_be_recorded_do_not_affect_others(ros, record):
     """The type is not installed."""
     unknown = ros.node.create_publisher(JointState, 'unknown', 10)
+    diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
     recorder = record(before="sys.modules['sensor_msgs'] = sys.modules['sensor_msgs.msg'] = None")
     counter = Counter(ros, 'count')
     recorder.wait_for_topics('/count')
     counter.wait_for_subscriptions(1)
     counter.publish(100)
     recorder.wait_for_log('/unknown is not recorded: no type sensor_msgs/msg/JointState here')
+    diagnostics.clear()
+    ros.spin_until(lambda: len(diagnostics) > 1, 'diagnostics')
+    said = diagnostics[-1].status[0]  # not just "recording"
+    assert said.message == 'not recorded /unknown (sensor_msgs/msg/JointState)'
+    assert said.level == DiagnosticStatus.WARN
     assert recorder.end() == 0
     assert counts(recorder.bag, '/count') == list(range(100))
     assert recorder.log.count('/unknown is not') == 1
