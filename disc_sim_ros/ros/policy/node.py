@@ -6,6 +6,7 @@ import sys
 import time
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock
@@ -17,6 +18,7 @@ from disc_sim_ros import topics
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.envs.pilot import Pilot
 from disc_sim_ros.errors import DiscSimError
+from disc_sim_ros.physics.flight_config import EventKey, nanoseconds_of
 from disc_sim_ros.ros import node_main, parameters, qos
 from disc_sim_ros.ros.policy.options import POLICY_TABLE, policy_config
 from disc_sim_ros.units import NANOSECONDS
@@ -24,6 +26,7 @@ from disc_sim_ros.units import NANOSECONDS
 PATIENCE = 60.0  # s for each answer of the simulator in lockstep; also for its start
 _RETRY = 0.5  # s; a simulator that has not yet matched a client drops its answer
 _NOTHING = (0.0, 0.0, 0.0)
+_ENDINGS = (topics.FlightEvent.LANDED, topics.FlightEvent.RESET, topics.FlightEvent.FAILED)
 
 
 class PolicyNode(Node):
@@ -49,6 +52,8 @@ class PolicyNode(Node):
         self._failure = self._landing = ''
         self._sent = self._applied = _NOTHING
         self._state: tuple[int, tuple[float, ...]] = (-1, ())  # newest odometry
+        self._released = -1  # stamp of the newest release [ns]
+        self._ending = -1, ''  # stamp [ns] and name of the newest event that ends a flight
         self._since = time.monotonic()
         self._command = self.create_publisher(
             Vector3Stamped, topics.CMD_COEFFICIENTS, qos.COMMAND_QOS
@@ -56,6 +61,7 @@ class PolicyNode(Node):
         for kind, name, take, profile in (
             (Vector3Stamped, topics.APPLIED_COEFFICIENTS, self._on_applied, qos.STATE_QOS),
             (Odometry, topics.RELEASE, self._on_release, qos.LATCHED_QOS),
+            (DiagnosticStatus, topics.FLIGHT_EVENTS, self._on_event, qos.LATCHED_QOS),
             (Odometry, topics.ODOM, self._on_odometry, qos.STATE_QOS),
         ):
             self.create_subscription(kind, name, take, profile)
@@ -93,7 +99,16 @@ class PolicyNode(Node):
         stamp, numbers = _read(message)
         if self._lockstep and (not self._thrown or stamp < self._state[0]):
             return  # of an earlier throw
+        self._released = stamp
         self._send(self._pilot.release(stamp, numbers))
+
+    def _on_event(self, message: DiagnosticStatus) -> None:
+        name = topics.event_of(message.name)
+        if name in _ENDINGS:
+            values = {pair.key: pair.value for pair in message.values}
+            self._ending = nanoseconds_of(values.get(EventKey.STAMP, '')) or 0, name
+            if self._state[1]:
+                self._go_on()
 
     def _on_odometry(self, message: Odometry) -> None:
         self._state = _read(message)
@@ -115,14 +130,16 @@ class PolicyNode(Node):
             control = self._pilot.update(stamp, numbers)
             if control is not None:
                 self._send(control)
-        elif stamp > last:
-            self._land(numbers)
+        elif stamp > last and self._ending[0] >= self._released:  # a disc may also be put back
+            self._end(numbers)
 
-    def _land(self, numbers: tuple[float, ...]) -> None:
+    def _end(self, numbers: tuple[float, ...]) -> None:
         self._pilot.land()
         x, y = numbers[:2]
         miss = math.dist((x, y), self._pilot.target)
         self._landing = f'landed at x {x:.2f} m, y {y:.2f} m, {miss:.2f} m from the target'
+        if self._ending[1] != topics.FlightEvent.LANDED:
+            self._landing = f'the flight ended without a landing: {self._ending[1]}'
         self.get_logger().info(self._landing)
         self._ended = self._lockstep
 

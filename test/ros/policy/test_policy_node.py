@@ -19,6 +19,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.ros.policy.node import _read
 from disc_sim_ros.ros.policy.options import policy_config
+from ros.sim.sim_messages import wall
 from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros
@@ -68,6 +69,40 @@ def test_in_lockstep_the_path_is_that_of_the_environment_to_the_bit(ros):
     x, y = info['landing']
     line = f'landed at x {x:.2f} m, y {y:.2f} m, {info["miss"]:.2f} m from the target'
     assert line in errors
+
+
+def test_a_disc_that_is_put_back_in_flight_has_not_landed(ros, tmp_path):
+    """It is at rest, as after a landing, and its landing afterwards is told."""
+    sim = ros.start({'auto_throw': False, 'launch.height': 5.0, 'real_time_factor': 2.0})
+    messages = ros.subscribe(Odometry, topics.ODOM)
+    log = tmp_path / 'policy.txt'
+    command = [
+        sys.executable,
+        '-m',
+        'disc_sim_ros.ros.policy',
+        '--ros-args',
+        '-p',
+        'target:=[9,0]',
+    ]
+    with log.open('wb') as file:
+        node = subprocess.Popen(command, stdout=file, stderr=file)
+    try:
+        ros.spin_until(lambda: 'steering to' in log.read_text(), 'the node')
+        ros.publisher(Odometry, 'throw')  # as long as it takes to match endpoints
+        for _ in range(2):
+            assert ros.call(sim, 'throw').success
+            ros.spin_until(lambda: messages and any(_read(messages[-1])[1][7:]), 'the flight')
+            ros.spin_until(wall(0.5))
+            assert 'landed' not in log.read_text()
+            if 'reset' not in log.read_text():
+                assert ros.call(sim, 'reset').success
+                ros.spin_until(
+                    lambda: 'ended without a landing: reset' in log.read_text(), 'its words'
+                )
+        ros.spin_until(lambda: 'landed at x' in log.read_text(), 'the landing')
+    finally:
+        node.kill()
+        node.wait()
 
 
 @pytest.mark.parametrize(
