@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 import sys
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -34,6 +35,7 @@ from disc_sim_ros.units import NANOSECONDS
 
 POLLING_PERIOD = 0.001  # s
 DIAGNOSTIC_PERIOD = 1.0  # s
+SILENCE = 0.5  # s without a measurement in a throw, which is told
 _TYPES = {
     'point': (PointStamped, PredictorTopic.MEASURED_POINT),
     'pose': (PoseStamped, PredictorTopic.MEASURED_POSE),
@@ -70,6 +72,7 @@ class PredictorNode(Node):
         self._epoch: int | None = None
         self._last_ellipse = -np.inf
         self._throw = 0
+        self._measured_at = time.monotonic()
         self._covariance = np.full((3, 3), np.nan)
         self._likely: dict[str, float] = {}  # weight of each disc, by its name
         self.predictions = self.refused = 0
@@ -129,6 +132,7 @@ class PredictorNode(Node):
             while (taken := subscription.take()) is not None:
                 added |= self._add(source, taken[0])
         if added:
+            self._measured_at = time.monotonic()
             self._predict()
         return False
 
@@ -190,7 +194,17 @@ class PredictorNode(Node):
     def _stamp(self, time: float) -> int:
         return max(0, (self._epoch or 0) + round(time * NANOSECONDS))
 
+    def _doing(self) -> tuple[bool, str]:
+        """Return whether all is well, and what this node does."""
+        if not self._predictor.is_following:
+            return True, 'waiting for a throw'
+        silent = time.monotonic() - self._measured_at
+        if silent < SILENCE:
+            return True, 'following a throw'
+        return False, f'in a throw of which nothing was measured for {silent:.1f} s'
+
     def _publish_diagnostics(self) -> None:
+        well, doing = self._doing()
         values: dict[str, object] = {
             'throws': self._predictor.throws,
             'predictions': self.predictions,
@@ -201,9 +215,9 @@ class PredictorNode(Node):
             weights = outputs.disc_weights(self._throw, self._likely).values
             values |= {f'weight of {v.key}': v.value for v in weights}
         status = DiagnosticStatus(
-            level=DiagnosticStatus.OK,
+            level=DiagnosticStatus.OK if well else DiagnosticStatus.WARN,
             name=f'{self.get_fully_qualified_name()}: prediction',
-            message='following a throw' if self._predictor.is_following else 'waiting for a throw',
+            message=doing,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
         message = DiagnosticArray(status=[status])

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.executors import SingleThreadedExecutor
@@ -194,6 +194,48 @@ def test_node_follows_a_throw(ros_context):
     weights = {value.key: float(value.value) for value in got['weights'][-1].values}
     assert weights['ultrastar'] > 0.99  # a golf disc falls much sooner
     assert sum(weights.values()) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_throw_whose_measurements_end_is_not_followed(ros_context):
+    """The tracker dies while the disc flies."""
+    flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 4)
+    chosen = [Parameter('disc_uncertainty', value=0.0), Parameter('discs', value='ultrastar')]
+    node = PredictorNode(context=ros_context, parameter_overrides=chosen)
+    peer = Node('tracker', context=ros_context, start_parameter_services=False)
+    executor = SingleThreadedExecutor(context=ros_context)
+    executor.add_node(node)
+    executor.add_node(peer)
+    arrays = []
+    peer.create_subscription(DiagnosticArray, '/diagnostics', arrays.append, 10)
+    publisher = peer.create_publisher(PoseStamped, PredictorTopic.MEASURED_POSE, STATE_QOS)
+
+    def spin_until(condition):
+        end = time.monotonic() + DEADLINE
+        while not condition():
+            assert time.monotonic() < end
+            executor.spin_once(0.01)
+
+    def says(text, level):
+        return any(
+            s.message.startswith(text) and s.level == level for a in arrays for s in a.status
+        )
+
+    spin_until(publisher.get_subscription_count)
+    node.start()
+    try:
+        spin_until(lambda: says('waiting for a throw', DiagnosticStatus.OK))
+        rows = list(zip(flown.time, flown.position, flown.axis, strict=True))
+        for t, position, axis in rows[: len(rows) // 3]:
+            publisher.publish(pose(100.0 + t, position, axis))
+            executor.spin_once(0.01)
+        spin_until(lambda: node.predictions > 3)
+        text = 'in a throw of which nothing was measured for '
+        spin_until(lambda: says(text, DiagnosticStatus.WARN))
+    finally:
+        assert node.stop() == ''
+        executor.shutdown()
+        node.destroy_node()
+        peer.destroy_node()
 
 
 def stamp(message) -> float:
