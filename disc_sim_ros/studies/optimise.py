@@ -16,6 +16,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.ensemble import Landings, fly_many
 from disc_sim_ros.physics.kernels.integrator import LOST
 from disc_sim_ros.quantities import STUDY
+from disc_sim_ros.studies import sampling
 from disc_sim_ros.studies.columns import ADVANCE_RATIO, LAUNCH, quantity
 from disc_sim_ros.studies.flying import kernel_values
 from disc_sim_ros.studies.scatter import Normal, quantiles
@@ -200,6 +201,7 @@ def optimise(problem: Problem, seed: int = 0) -> Optimum:
         evaluated += len(unit)
         return sign * problem.values(low + np.clip(unit, 0.0, 1.0) * (high - low), few)
 
+    sampling.load_sobol()
     best = optimize.differential_evolution(
         lambda x: cost(x.T if x.ndim > 1 else x[None], min(samples, _FEW)),
         [(0.0, 1.0)] * len(low),

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.threads import ctrl_c_waits
 
 RANDOM, SOBOL = 'random', 'sobol'
 METHODS = (RANDOM, SOBOL)
@@ -73,10 +74,23 @@ def _scrambled_basis(dimensions: int, seed: int, bits: int) -> tuple[IntArray, I
     return (basis << (_BITS - 1 - digit)).sum(axis=-1), shift
 
 
+@lru_cache(maxsize=1)
+def load_sobol() -> None:
+    """Let scipy read the table of its Sobol sequence, once, with Ctrl-C held back.
+
+    The compiled code of scipy prints a KeyboardInterrupt there, and goes on with half a table.
+    """
+    with ctrl_c_waits():
+        from scipy.stats import qmc  # noqa: PLC0415 - it takes a second, and only Sobol needs it
+
+        qmc.Sobol(1, scramble=False)
+
+
 @lru_cache(maxsize=8)
 def _sobol_basis(dimensions: int, bits: int) -> IntArray:
     """Return the direction numbers of scipy's Sobol sequence, shape (bits, dimensions)."""
-    from scipy.stats import qmc  # noqa: PLC0415 - it takes a second, and only Sobol needs it
+    load_sobol()
+    from scipy.stats import qmc  # noqa: PLC0415
 
     sequence = qmc.Sobol(dimensions, scramble=False)
     basis = np.zeros((bits, dimensions), dtype=np.int64)

@@ -1,6 +1,9 @@
 """Samples: each depends only on the seed and on its number, and follows its law."""
 
+import json
 import math
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -163,3 +166,28 @@ def test_contradictions_are_refused(changes, message):
 def test_a_scatter_needs_a_standard_deviation(sd):
     with pytest.raises(ConfigError, match='standard deviation'):
         Normal(sd)
+
+
+INTERRUPTED = """
+from contextlib import suppress
+import signal
+from scipy.stats import qmc
+from disc_sim_ros.studies.sampling import load_sobol
+
+signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+signal.setitimer(signal.ITIMER_REAL, {delay})
+with suppress(KeyboardInterrupt):
+    load_sobol()
+print(qmc.Sobol(40, scramble=False).random(8).tolist())
+"""
+
+
+@pytest.mark.parametrize('delay', [0.001, 0.003, 0.01])
+def test_ctrl_c_leaves_scipy_no_half_table_of_direction_numbers(delay):
+    """Its compiled code prints KeyboardInterrupt and goes on, with other points from then on."""
+    done = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED.format(delay=delay)],
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert done.stderr == ''
+    assert json.loads(done.stdout) == stats.qmc.Sobol(40, scramble=False).random(8).tolist()
