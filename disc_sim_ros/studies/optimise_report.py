@@ -80,7 +80,9 @@ def optimum_text(optimum: Optimum, command: str, system: System = METRIC) -> str
         for name, (low, high) in optimum.flat.items()
     )
     worse = text(slack(problem, optimum.value), unit, '.2g')
-    lines.append(f'  flat     {worse} worse at most: {flat}')
+    # Several at an end together are worse than that.
+    alone = ', one changed alone' if len(optimum.flat) > 1 else ''
+    lines.append(f'  flat     {worse} worse at most{alone}: {flat}')
     if optimum.at_limit:
         lines.append(f'  limits   hold {" and ".join(optimum.at_limit)}')
     lines += [f'  tried    {optimum.launches} launches', f'  again    {command}']

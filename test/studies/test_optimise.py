@@ -95,6 +95,14 @@ def aimed():
     return optimise(Problem(study=study, limits=limits, goal='accuracy', target=(20.0, 4.0)))
 
 
+def test_the_flat_ranges_hold_for_one_quantity_alone_and_say_so(windy):
+    """At the ends of two ranges together the loss is greater than that of each."""
+    corners = [(p, r) for p in windy.flat['pitch'] for r in windy.flat['roll']]
+    worst = windy.value - windy.problem.values(np.array(corners), 1).min()
+    assert worst > 1.2 * windy.slack
+    assert 'worse at most, one changed alone: pitch' in optimise_report.optimum_text(windy, '')
+
+
 def test_scattered_throws_gather_around_the_target(aimed):
     study = aimed.study
     throws = aimed.problem.landings(np.array([list(aimed.launch.values())]), 16)
