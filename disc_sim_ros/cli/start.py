@@ -62,7 +62,8 @@ def _interrupts_after_imports() -> Iterator[None]:
         yield
         return
     signal.signal(signal.SIGINT, _interrupt)
-    signal.signal(signal.SIGALRM, _interrupt)
+    # By way of SIGINT: another handler may stand there, such as that of `ctrl_c_waits`.
+    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     waiting = False
     try:
         yield

@@ -65,6 +65,19 @@ def test_no_worker_shows_a_traceback_while_it_starts(program, tmp_path, delay):
     assert code in ENDED
 
 
+@pytest.mark.parametrize('delay', [0.1, 0.102, 0.104, 0.106])
+def test_ctrl_c_in_an_import_waits_also_for_workers_that_start_after_it(tmp_path, delay):
+    (tmp_path / 'slow.py').write_text('import time; time.sleep(0.3)', encoding='utf-8')
+    path = tmp_path / 'workers.py'
+    path.write_text(
+        WORKERS.replace("ready', flush=True)", "ready', flush=True)\n    import slow"),
+        encoding='utf-8',
+    )
+    code, error = interrupted([sys.executable, path], delay, tmp_path, ready='ready')
+    assert error == ''
+    assert code in ENDED
+
+
 def test_the_program_ends_as_usual_without_ctrl_c(program):
     done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ('ready\ndone\n', '')
