@@ -1,7 +1,14 @@
 """Runs a study: batches of flights in threads, processes, Dask or any other executor."""
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +23,7 @@ from disc_sim_ros.studies.flying import fly_batch
 from disc_sim_ros.studies.storage import DEFAULT_BATCH, Parts
 from disc_sim_ros.studies.study import Study, study_differences, study_document
 
+_PATIENCE = 60.0  # s, longest wait for batches that fly when a sweep stops
 AHEAD = 8  # default of the most batches submitted at a time; 1 MB each
 
 Progress = Callable[[int, int], None]  # finished flights, all flights
@@ -181,13 +189,13 @@ class _Work:
             raise
 
     def _keep_finished(self, flying: dict[Future[tables.Columns], int]) -> None:
-        """Cancel the waiting batches, and keep those that have finished in the meantime."""
-        for future in flying:
-            future.cancel()
+        """Cancel the waiting batches; keep those that have finished, and those that are flying."""
+        running = [future for future in flying if not future.cancel()]
         with suppress(DiscSimError):  # for instance a disk that is still full
-            for future, number in flying.items():
-                if future.done() and not future.cancelled() and future.exception() is None:
-                    self.keep(number, future.result())
+            # The end of the executor waits for them, too.
+            for future in wait(running, timeout=_PATIENCE).done:
+                if not future.cancelled() and future.exception() is None:
+                    self.keep(flying[future], future.result())
 
 
 def _is_lost_worker(error: Exception) -> bool:

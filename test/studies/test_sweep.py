@@ -2,6 +2,7 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import contextlib
+from dataclasses import replace
 import json
 import multiprocessing
 import os
@@ -221,6 +222,35 @@ def test_a_part_whose_count_ctrl_c_prevents_is_counted_all_the_same(tmp_path, mo
         sweep(STUDY, tmp_path / 'a.parquet', batch=50, progress=lambda *n: counts.append(n[0]))
     parts = list((tmp_path / 'a.parquet.parts').glob('*.parquet'))
     assert counts[-1] == 50 * len(parts) >= 150
+
+
+class Counter(ThreadPoolExecutor):
+    """Two threads, and the futures of all that they were given."""
+
+    def __init__(self):
+        super().__init__(2)
+        self.futures = []
+
+    def submit(self, *call):
+        self.futures.append(super().submit(*call))
+        return self.futures[-1]
+
+
+def test_batches_that_fly_at_ctrl_c_are_kept(tmp_path):
+    calls = []
+
+    def progress(done: int, total: int) -> None:
+        calls.append(done)
+        if len(calls) == 2:  # the first call is for what is resumed
+            raise KeyboardInterrupt
+
+    slow = replace(STUDY, setup=replace(SETUP, step=1e-4))  # a batch takes 0.1 s
+    with Counter() as executor, pytest.raises(KeyboardInterrupt):
+        sweep(slow, tmp_path / 'a.parquet', batch=50, executor=executor, progress=progress)
+    flown = [f for f in executor.futures if not f.cancelled()]
+    assert 2 <= len(flown) < len(executor.futures)
+    parts = list((tmp_path / 'a.parquet.parts').glob('*.parquet'))
+    assert len(parts) == len(flown)
 
 
 def test_a_resumed_sweep_keeps_its_flights_and_ends_as_an_uninterrupted_one(expected, tmp_path):
