@@ -25,6 +25,7 @@ from disc_sim_ros.topics import Frames
 from disc_sim_ros.units import NANOSECONDS
 
 _LANDED = 'landed.'  # begins the names of the differences of a landing
+_LONGEST_UNSEEN = 600.0  # s of a flight without messages up to its landing
 _ROUNDED = 2  # ns by which a stamp may miss its step: stamps are rounded down
 
 
@@ -122,16 +123,17 @@ def fly_again(flight: Flight) -> Reflight:
 
 
 def _last_step(flight: Flight, config: FlightConfig, last: int) -> int:
-    """Return the step of the landing if the next message would show it, or the step `last`.
+    """Return the step of the landing if the bag has its event, or the step `last`.
 
-    The event is published when the disc lands, the message when it is due: a bag may end between.
+    The event is published when the disc lands, the message when it is due: a bag may end between,
+    and messages may be missing before.
     """
     landing = None if flight.landing is None else landing_from(flight.landing.values)
     if landing is None:
         return last
     landed = landing.flight_time_s * config.physics_rate
-    next_message = last + config.physics_rate / config.publish_rate
-    return math.ceil(landed) if last < landed < next_message else last
+    longest = _LONGEST_UNSEEN * config.physics_rate
+    return math.ceil(landed) if last < landed < last + longest else last
 
 
 def compare(flight: Flight, again: Reflight, bag_doubts: tuple[str, ...] = ()) -> Verdict:

@@ -82,8 +82,10 @@ def test_messages_missing_up_to_the_end_of_a_flight_are_counted(verify, flights,
     lost = sum(end <= at < landing for at in odometry(steered))
     assert lost > 40
     assert (flight['messages']['missing'], flight['messages']['missing_after']) == (0, lost)
+    assert flight['verification']['passed']  # up to the event of the landing
     code, out = verify(bag)
     assert f'{lost} missing at the end' in out
+    assert f'messages and the landing; {lost} more are missing' in out
     assert code == 3  # of the second throw there is nothing
 
 
