@@ -100,8 +100,8 @@ def test_a_publisher_that_comes_again_is_told_of_as_well(ros, record):
     recorded = counts(recorder.bag, '/count')[10:]
     before = 40 - len(recorded)
     assert recorded == list(range(before, 40))
-    told = [int(n) for n in re.findall(r'/count (\d+)', last_line(recorder))]
-    assert told == [before] * (before > 0)
+    numbers = [int(n) for n in re.findall(r'/count (\d+)', last_line(recorder))]
+    assert numbers == [before] * (before > 0)
 
 
 def test_a_recorder_without_topics_does_not_claim_that_nothing_was_lost(record):
