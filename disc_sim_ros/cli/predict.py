@@ -16,7 +16,7 @@ from disc_sim_ros.cli.main import run_program
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.quantities import MEAN_WIND, PREDICTION
-from disc_sim_ros.units import NANOSECONDS, SYSTEMS
+from disc_sim_ros.units import NANOSECONDS, SYSTEMS, System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,7 +77,7 @@ def _run(chosen: argparse.Namespace) -> int:
     from disc_sim_ros.estimation.replay import replay  # noqa: PLC0415
 
     plot = getattr(chosen, 'plot', None)
-    config = _config(chosen)
+    config, system = _config(chosen), SYSTEMS[chosen.units]
     series = _measurements(chosen)
     note = first_call_note()
     if note:
@@ -90,9 +90,9 @@ def _run(chosen: argparse.Namespace) -> int:
         document = {'throws': [_document(throw, config.discs) for throw in throws]}
         output.show(json.dumps(document, allow_nan=False))
     else:
-        output.show('\n\n'.join(_summary(throw, config.discs) for throw in throws))
+        output.show('\n\n'.join(_summary(throw, config.discs, system) for throw in throws))
     if plot is not None:
-        output.write_plot(plot, _figure(throws))
+        output.write_plot(plot, _figure(throws, system))
     if pages.is_wanted(chosen):  # after the numbers: they come even if the disk is full
         line = _write_page(chosen, throws, config)
         if chosen.json:
@@ -195,22 +195,24 @@ def _document(throw: 'FollowedThrow', discs: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
+def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> str:
     x, y, time = throw.landing
     last = throw.predictions[-1]
     whole = throw.is_complete
     lines = [
         f'throw {throw.number}: measured from {last.reference_time:.3f} s, '
         f'{"lands" if whole else "would land"} at '
-        f'x {x:.2f} m, y {y:.2f} m after {time - last.reference_time:.2f} s'
+        f'x {system.text(x, "m")}, y {system.text(y, "m")} after {time - last.reference_time:.2f} s'
     ]
     if not whole:
         left = last.landing_time - last.time
         lines.append(f'  the measurements end {left:.2f} s before the landing: no miss is known')
-    distance = ' miss m' if whole else 'from the last m'
-    lines.append(f'  watched s   x m      y m      sigma x, y m    {distance}')
+    m = f'{system.length:<2}'
+    distance = f' miss {m}' if whole else f'from the last {m}'
+    lines.append(f'  watched s   x {m}     y {m}     sigma x, y {m}   {distance}'.rstrip())
     for row in _rows(throw):
         r = {name: x for name, x in row.items() if x is not None}
+        r |= {name: system.number(x, 'm') for name, x in r.items() if name.endswith('_m')}
         until = r['measured_until_s']
         stale = until < r['watched_s'] - _STALE
         lines.append(
@@ -219,7 +221,8 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
             + f'  nothing measured since {until:.2f} s'
             * stale
         )
-    lines.append(f'  estimated wind {last.wind[0]:.1f}, {last.wind[1]:.1f} m/s')
+    wind = system.number(last.wind[0], 'm/s'), system.text(last.wind[1], 'm/s', '.1f')
+    lines.append(f'  estimated wind {wind[0]:.1f}, {wind[1]}')
     if len(discs) > 1:
         likely = sorted(
             zip(discs, last.weights, strict=True), key=lambda pair: pair[1], reverse=True
@@ -228,7 +231,7 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str]) -> str:
     return '\n'.join(lines)
 
 
-def _figure(throws: 'Sequence[FollowedThrow]') -> 'Figure':
+def _figure(throws: 'Sequence[FollowedThrow]', system: System) -> 'Figure':
     """Return the miss of each throw over the time of watching."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -243,13 +246,17 @@ def _figure(throws: 'Sequence[FollowedThrow]') -> 'Figure':
         colour = COLOURS[i % len(COLOURS)]
         of = 'landing' if throw.is_complete else 'last prediction: it was measured in part'
         label = f'throw {throw.number}: miss of the {of}'
-        axis.semilogy(throw.watched, throw.misses, color=colour, label=label)
-        sigma = [float(p.covariance[:2, :2].trace()) ** 0.5 for p in throw.predictions]
+        misses = system.number(throw.misses, 'm')
+        axis.semilogy(throw.watched, misses, color=colour, label=label)
+        sigma = [
+            system.number(float(p.covariance[:2, :2].trace()) ** 0.5, 'm')
+            for p in throw.predictions
+        ]
         label = f'throw {throw.number}: standard deviation that the predictor states'
         axis.semilogy(throw.watched, sigma, color=colour, ls=':', label=label)
-    axis.set(xlabel='measured for, s', ylabel='distance on the ground, m')
-    axis.set_ylim(bottom=LEAST_MISS)  # the last miss is 0
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda metres, _: f'{metres:g}'))
+    axis.set(xlabel='measured for, s', ylabel=f'distance on the ground, {system.length}')
+    axis.set_ylim(bottom=system.number(LEAST_MISS, 'm'))  # the last miss is 0
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda distance, _: f'{distance:g}'))
     axis.grid(color='0.9')
     axis.legend(loc='best', fontsize='small')
     return figure

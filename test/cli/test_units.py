@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from disc_sim_ros.cli import analyse_bag, fly, optimise, sweep
+from disc_sim_ros.cli import analyse_bag, fly, optimise, predict, sweep
 
 FACTORS = {('m', 'ft'): 0.3048, ('m/s', 'mph'): 0.44704, ('rad/s', 'rpm'): 3.14159265359 / 30.0}
 NUMBER = r'[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?'
@@ -67,3 +67,20 @@ def test_a_bag_is_told_in_both_systems(tmp_path, capsys):
         texts[system] = capsys.readouterr().out
     assert not METRIC.search(texts['us'])
     require_equal(*(lengths_and_rates(text, system) for system, text in texts.items()))
+
+
+def test_a_prediction_is_told_in_both_systems(tmp_path, capsys):
+    assert fly.main(['--bag', str(tmp_path / 'bag'), '--wind', '3', '1', '0']) == 0
+    capsys.readouterr()
+    texts = {}
+    for system in ('metric', 'us'):
+        assert predict.main([str(tmp_path / 'bag'), '--units', system]) == 0
+        texts[system] = capsys.readouterr().out
+    require_equal(*(lengths_and_rates(text, system) for system, text in texts.items()))
+    head = 'watched s   x ft     y ft     sigma x, y ft    miss ft'
+    assert texts['us'].splitlines()[1].strip() == head
+    rows = [[line.split() for line in text.splitlines()[2:-1]] for text in texts.values()]
+    for metric, us in zip(*rows, strict=True):
+        assert metric[0] == us[0]
+        for a, b in zip(metric[1:], us[1:], strict=True):
+            assert float(a) == pytest.approx(0.3048 * float(b), abs=0.007)  # both rounded
