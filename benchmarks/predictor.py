@@ -61,6 +61,7 @@ class Cell:
         outliers: Share of the positions that are wrong by 5 m in each coordinate.
         rate: Measurements a second [Hz].
         late: Time after the release at which the first measurement is made [s].
+        forehand: They spin the other way round, which the predictor is not told.
     """
 
     flown: str = 'ultrastar'
@@ -70,6 +71,7 @@ class Cell:
     outliers: float = 0.0
     rate: float = 60.0
     late: float = 0.0
+    forehand: bool = False
 
 
 CELLS = {
@@ -86,6 +88,7 @@ CELLS = {
     '120 Hz': Cell(rate=120.0),
     '240 Hz': Cell(rate=240.0),
     'first seen after 0.3 s': Cell(late=0.3),
+    'forehand': Cell(forehand=True),
 }
 
 
@@ -120,6 +123,8 @@ def rows(name: str, attitude: bool, seeds: range, times: list[list[float]]) -> N
     offsets = disc_offsets(load_disc(cell.assumed), cell.uncertainty)
     prior = replace(base, offsets=offsets, shape=disc_shape(cell.uncertainty))
     drawn = prior if cell.flown == cell.assumed else base
+    if cell.forehand:
+        drawn = drawn.with_opposite_spin()
     setup = Setup(disc=load_disc(cell.flown))
     config = PredictorConfig(setup=Setup(disc=load_disc(cell.assumed)), prior=prior)
     exact = Model(setup, drawn, 1.0 / 120.0, 15.0)

@@ -90,7 +90,9 @@ def _run(chosen: argparse.Namespace) -> int:
         document = {'throws': [_document(throw, config.discs) for throw in throws]}
         output.show(json.dumps(document, allow_nan=False))
     else:
-        output.show('\n\n'.join(_summary(throw, config.discs, system) for throw in throws))
+        parts = [_assumed(chosen, config, system)]
+        parts += [_summary(throw, config.discs, system) for throw in throws]
+        output.show('\n\n'.join(parts))
     if plot is not None:
         output.write_plot(plot, _figure(throws, system))
     if pages.is_wanted(chosen):  # after the numbers: they come even if the disk is full
@@ -195,6 +197,15 @@ def _document(throw: 'FollowedThrow', discs: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _assumed(chosen: argparse.Namespace, config: 'PredictorConfig', system: System) -> str:
+    spin = f'{system.number(chosen.throw_spin, "rad/s"):.0f}'
+    sigma = system.text(chosen.throw_spin_sigma, 'rad/s', '.0f')
+    return (
+        f'assumed: {" or ".join(config.discs)} (--disc), '
+        f'spin of {spin} +- {sigma} (--throw-spin), {config.opposite_spin:.0%} the other way round'
+    )
+
+
 def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> str:
     x, y, time = throw.landing
     last = throw.predictions[-1]
@@ -202,7 +213,8 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> st
     lines = [
         f'throw {throw.number}: measured from {last.reference_time:.3f} s, '
         f'{"lands" if whole else "would land"} at '
-        f'x {system.text(x, "m")}, y {system.text(y, "m")} after {time - last.reference_time:.2f} s'
+        f'x {system.text(x, "m")}, y {system.text(y, "m")} '
+        f'after {time - last.reference_time:.2f} s'
     ]
     if not whole:
         left = last.landing_time - last.time

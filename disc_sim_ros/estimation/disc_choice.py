@@ -1,4 +1,7 @@
-"""One throw, estimated with each of several discs: which it is, and where it lands."""
+"""One throw, estimated with each of several models: which it is, and where it lands.
+
+Models differ in the disc, or in the way in which it spins.
+"""
 
 from collections.abc import Sequence
 
@@ -9,21 +12,32 @@ from disc_sim_ros.estimation.ellipse import covariance_about
 from disc_sim_ros.estimation.throw_estimator import ThrowEstimator
 from disc_sim_ros.estimation.throw_fit import Fitted, Linear, Measurements, Model
 
-LEAST_WEIGHT = 1e-6  # a disc below it is left out for the rest of the throw
+LEAST_WEIGHT = 1e-6  # a model below it is left out for the rest of the throw
 
 
 class DiscChoice:
-    """The estimates of one throw, and how likely each disc is.
+    """The estimates of one throw, and how likely each model is.
 
     Attributes:
-        weights: Probability of each disc, shape (n,); equal before the first update.
+        weights: Probability of each model, shape (n,); before the first update as expected.
         best: The place of the most likely one.
     """
 
-    def __init__(self, models: Sequence[Model]) -> None:
-        """Begin with every disc equally likely."""
-        self._estimators = [ThrowEstimator(model) for model in models]
-        self.weights = np.full(len(models), 1.0 / len(models))
+    def __init__(
+        self, models: Sequence[Model], unlikely: Sequence[Model] = (), share: float = 0.0
+    ) -> None:
+        """Begin with the probabilities that are expected.
+
+        Args:
+            models: The models, equally likely.
+            unlikely: Models that are less likely, equally; their numbers follow those of `models`.
+            share: Probability of all of `unlikely`.
+        """
+        self._estimators = [ThrowEstimator(model) for model in (*models, *unlikely)]
+        self._likely = len(models)
+        self.weights = np.full(len(self._estimators), (1.0 - share) / len(models))
+        self.weights[len(models) :] = share / max(len(unlikely), 1)
+        self._expected = np.log(np.maximum(self.weights, LEAST_WEIGHT))
         self.best = 0
 
     @property
@@ -40,22 +54,25 @@ class DiscChoice:
         assert linear is not None  # noqa: S101 - for the type checker
         return linear
 
-    def update(self, data: Measurements, steps: int = 1) -> Fitted:
-        """Fit all measurements of the throw with each disc; return the fit of the most likely.
+    def update(self, data: Measurements, steps: int = 1, *, unlikely: bool = True) -> Fitted:
+        """Fit all measurements of the throw with each model; return the fit of the most likely.
 
         Args:
             data: All measurements so far, the first at time 0.
             steps: Gauss-Newton steps; the first update makes more.
+            unlikely: Update the unlikely models, too, and the probabilities.
         """
         kept = self._kept
         for i in kept:
-            self._estimators[i].update(data, steps)
-        if len(kept) > 1:
+            if unlikely or i < self._likely or i == self.best:
+                self._estimators[i].update(data, steps)
+        if len(kept) > 1 and (unlikely or kept[-1] < self._likely):
             evidence = np.array([self._estimators[i].log_evidence for i in kept])
+            evidence += self._expected[kept]
             if np.isfinite(evidence).any():
-                likely = np.exp(evidence - evidence[np.isfinite(evidence)].max())
+                probable = np.exp(evidence - evidence[np.isfinite(evidence)].max())
                 self.weights[:] = 0.0
-                self.weights[kept] = likely / likely.sum()
+                self.weights[kept] = probable / probable.sum()
                 self.best = int(np.argmax(self.weights))
         return self.fitted
 
@@ -66,13 +83,22 @@ class DiscChoice:
     def landing_covariance(self) -> FloatArray:
         """Return the mean squares of X, Y [m] and time [s] about the landing, shape (3, 3).
 
-        Over all discs: a disc that lands elsewhere widens it by its weight. nan if too few of the
+        Over all models: one that lands elsewhere widens it by its weight. Of an unlikely one only
+        the landing counts, not its spread, which would take as long again. nan if too few of the
         drawn throws land.
         """
         about, total, weight = self.fitted.landing, np.zeros((3, 3)), 0.0
         for i in self._kept:
-            covariance = covariance_about(self._estimators[i].landings(), about)
+            if i < self._likely or i == self.best:
+                landings = self._estimators[i].landings()
+            else:
+                landings = self._landing_of(i)
+            covariance = covariance_about(landings, about)
             if np.isfinite(covariance).all():
                 total += self.weights[i] * covariance
                 weight += self.weights[i]
         return total / weight if weight > 0.0 else np.full((3, 3), np.nan)
+
+    def _landing_of(self, i: int) -> FloatArray:
+        fitted = self._estimators[i].fitted
+        return np.empty((0, 3)) if fitted is None else fitted.landing[None]

@@ -23,6 +23,7 @@ from disc_sim_ros.quantities import POSITION, PREDICTION
 MOST_MEASUREMENTS = 600  # of one throw; of more, every second of the older half is left out
 STEP = 0.02  # s; without nutation within 26 mm, 0.2 mm in the median (docs/predictor.md)
 MORE = 4  # Gauss-Newton steps before a throw is taken to have ended
+_MOST_WAITING = 3  # updates in a row without the opposite spin
 _ORDER = 1e-9  # s between two measurements
 _BACK = 1.0  # s by which time is set back, not a late measurement
 
@@ -35,6 +36,8 @@ class PredictorConfig:
         setup: Disc, air, profile of the wind and ground contact. Its model and step are replaced.
         prior: Release, wind and uncertainty of the disc.
         others: Setups and priors with other discs that may have been thrown.
+        opposite_spin: Probability of a throw that spins the other way round: a forehand spins a
+            disc as a left-handed backhand does. 0: it is not tried.
         position_sigma: Standard deviation of each coordinate of a position [m].
         attitude_sigma: Standard deviation of the disc's axis in each direction [rad].
         duration: Longest flight [s].
@@ -44,6 +47,7 @@ class PredictorConfig:
     setup: Setup
     prior: ThrowPrior = field(default_factory=ThrowPrior)
     others: tuple[tuple[Setup, ThrowPrior], ...] = ()
+    opposite_spin: float = 0.02
     position_sigma: float = 0.02
     attitude_sigma: float = math.radians(2.0)
     duration: float = 15.0
@@ -56,6 +60,13 @@ class PredictorConfig:
             Model(replace(setup, model=SLOWING), prior, STEP, self.duration)
             for setup, prior in ((self.setup, self.prior), *self.others)
         )
+
+    @property
+    def models_of_opposite_spin(self) -> tuple[Model, ...]:
+        """Return the same with the opposite spin; none if it is not tried."""
+        if self.opposite_spin <= 0.0:
+            return ()
+        return tuple(replace(m, prior=m.prior.with_opposite_spin()) for m in self.models)
 
     @property
     def setups(self) -> tuple[Setup, ...]:
@@ -148,9 +159,11 @@ class Predictor:
         """Wait for a throw."""
         self._config = config
         self._models = config.models
+        self._opposite = config.models_of_opposite_spin
         self._estimator: DiscChoice | None = None
         self._rows = _NO_ROWS  # time, position, sigma, axis; ascending
         self._new = False
+        self._waiting = 0  # updates with an ellipse since the opposite spin was tried
         self.throws = 0
         self.late = 0
 
@@ -164,7 +177,7 @@ class Predictor:
             axis=np.tile([0.0, 0.0, 1.0], (8, 1)),
             axis_sigma=np.full(8, 0.1),
         )
-        of_each = DiscChoice(self._models)
+        of_each = self._choice()
         of_each.update(made_up)
         of_each.landing_covariance()
         prediction = self._prediction(of_each, made_up, start=0.0, ellipse=False)
@@ -230,13 +243,15 @@ class Predictor:
             first = throw_detection.beginning(data.time, data.position, data.sigma)
             if first is None:
                 return None
-            self._estimator = DiscChoice(self._models)
+            self._estimator = self._choice()
             self.throws += 1
             self._rows = self._rows[first:]
             data = self._measurements()
-        fitted = self._estimator.update(data)
+        # The opposite spin in turn with the ellipse: either takes about as long as all else.
+        self._waiting = 0 if not ellipse or self._waiting >= _MOST_WAITING else self._waiting + 1
+        fitted = self._estimator.update(data, unlikely=self._waiting == 0)
         if early := throw_detection.of_the_hand(data.time, fitted.squares[:, 0]):
-            self._estimator, self._rows = DiscChoice(self._models), self._rows[early:]
+            self._estimator, self._rows = self._choice(), self._rows[early:]
             data = self._measurements()
             fitted = self._estimator.update(data)
         if _has_ended(fitted, data) and _has_ended(self._estimator.update(data, MORE), data):
@@ -246,6 +261,9 @@ class Predictor:
             return None
         start = float(self._rows[0, 0])
         return self._prediction(self._estimator, data, start, ellipse=ellipse)
+
+    def _choice(self) -> DiscChoice:
+        return DiscChoice(self._models, self._opposite, self._config.opposite_spin)
 
     def _measurements(self) -> Measurements:
         rows = self._rows
@@ -260,15 +278,17 @@ class Predictor:
     def _prediction(
         self, estimator: DiscChoice, data: Measurements, start: float, *, ellipse: bool
     ) -> Prediction:
-        fitted, linear, model = estimator.fitted, estimator.linear, self._models[estimator.best]
+        discs = len(self._models)
+        disc = estimator.best % discs
+        fitted, linear, model = estimator.fitted, estimator.linear, self._models[disc]
         wind, spread = _wind(model, fitted.estimate, linear)
         covariance = np.full((3, 3), np.nan)
         if ellipse:
             covariance = _TURN @ estimator.landing_covariance() @ _TURN
         return Prediction(
             throw=self.throws,
-            disc=estimator.best,
-            weights=estimator.weights.copy(),
+            disc=disc,
+            weights=estimator.weights.reshape(-1, discs).sum(axis=0),
             time=start + float(data.time[-1]),
             landing_time=start + float(fitted.landing[2]),
             landing=map_from_paper([fitted.landing[0], fitted.landing[1], 0.0])[:2] + 0.0,

@@ -1,6 +1,6 @@
 """What is known of a throw before it is measured: how people throw, the wind, and the disc."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 
 import numpy as np
@@ -71,6 +71,10 @@ class ThrowPrior:
     def every_constant(self) -> dict[str, Gaussian]:
         """Return the constants of a flight by their column."""
         return {'wind_x': self.wind_x, 'wind_y': self.wind_y, **self.offsets}
+
+    def with_opposite_spin(self) -> 'ThrowPrior':
+        """Return the prior of throws that spin the other way."""
+        return replace(self, spin=Gaussian(-self.spin.mean, self.spin.sigma))
 
     def state_residuals(self, states: FloatArray) -> FloatArray:
         """Return by how many standard deviations releases differ from the prior.

@@ -28,6 +28,10 @@ FIRST_STEPS = 6  # Gauss-Newton steps of the first update
 # lags behind the measurements, and more than four cost more time than they gain.
 _FAR = 0.02
 _MOST_MORE = 3
+# Derivatives are differences over one standard deviation, which sees beyond the corners of the
+# table. Where a step along them gains nothing, this share of it shows the slope at the estimate,
+# which may lie very near a corner.
+_NARROW = 1e-3
 _FIRST_VELOCITY = 1.0  # m/s, with which the first derivatives are taken
 _FIRST_LIFT = 5.0  # m/s^2
 _LOST = 4.0  # scale of the residuals from which the throw is fitted from the beginning
@@ -65,13 +69,18 @@ class ThrowEstimator:
             steps = FIRST_STEPS
         else:
             estimate = self.fitted.estimate
+        narrow = False
         for k in range(1, steps + _MOST_MORE + 1):
             duration = model.duration if k >= steps else 0.0
-            self.linear, step, self._scale = linearised(model, estimate, self._spread, data)
+            spread = _NARROW * self._spread if narrow else self._spread
+            self.linear, step, self._scale = linearised(model, estimate, spread, data)
             self.fitted = best_on_line(model, estimate, step, data, self._scale, duration)
             estimate = self.fitted.estimate
             self._spread = square_root(self.linear.covariance[POSITION:, POSITION:])
-            if k >= steps and not self.fitted.gain > _FAR:
+            narrow = (
+                not self.fitted.gain > 0.0 and not narrow and _promise(self.linear, step) > _FAR
+            )
+            if k >= steps and not (narrow or self.fitted.gain > _FAR):
                 break
         self._data = data
         assert self.fitted is not None  # noqa: S101 - for the type checker
@@ -96,6 +105,11 @@ class ThrowEstimator:
         measured = np.count_nonzero(self._data.per_sigma, axis=0)
         scales = float(measured @ np.log(self._scale) + np.sum(np.log(self._model.sigmas)))
         return 0.5 * float(volume) - self.fitted.cost - scales
+
+
+def _promise(linear: Linear, step: FloatArray) -> float:
+    """Return the gain in cost that a Gauss-Newton step would have if all were linear."""
+    return 0.5 * float(step @ np.linalg.solve(linear.covariance, step))
 
 
 def _first_spread(model: Model) -> FloatArray:

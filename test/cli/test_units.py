@@ -76,10 +76,12 @@ def test_a_prediction_is_told_in_both_systems(tmp_path, capsys):
     for system in ('metric', 'us'):
         assert predict.main([str(tmp_path / 'bag'), '--units', system]) == 0
         texts[system] = capsys.readouterr().out
-    require_equal(*(lengths_and_rates(text, system) for system, text in texts.items()))
+    numbers = [lengths_and_rates(text, system) for system, text in texts.items()]
+    assert len(numbers[0]) == 4
+    require_equal(*numbers)
     head = 'watched s   x ft     y ft     sigma x, y ft    miss ft'
-    assert texts['us'].splitlines()[1].strip() == head
-    rows = [[line.split() for line in text.splitlines()[2:-1]] for text in texts.values()]
+    assert texts['us'].splitlines()[3].strip() == head
+    rows = [[line.split() for line in text.splitlines()[4:-1]] for text in texts.values()]
     for metric, us in zip(*rows, strict=True):
         assert metric[0] == us[0]
         for a, b in zip(metric[1:], us[1:], strict=True):

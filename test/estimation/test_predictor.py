@@ -10,6 +10,7 @@ from disc_sim_ros.estimation.prior import ThrowPrior, disc_offsets
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.sampled import default_row, fly_sampled
 from estimation.synthetic_throws import Throw, throw
@@ -55,6 +56,19 @@ def test_landing_is_known_after_a_second(many_throws):
     """
     misses = [miss(follow(t.measurements(axis=True), 1.0), t) for t in many_throws]
     assert np.median(misses) < 0.45
+
+
+def test_a_forehand_is_followed_as_a_backhand_is():
+    expecting = replace(CONFIG, prior=PRIOR.with_opposite_spin())
+    for seed in range(4):
+        forehand = throw(SETUP, PRIOR.with_opposite_spin(), seed)
+        known, unknown = (
+            follow(forehand.measurements(axis=True), 1.5, config) for config in (expecting, CONFIG)
+        )
+        assert unknown.throw == 1
+        assert unknown.state[State._fields.index('r')] < 0.0
+        # Both searches end where a step promises less than 0.2 standard deviations.
+        assert unknown.landing == pytest.approx(known.landing, abs=0.1)
 
 
 def test_positions_alone_need_longer(throws):

@@ -137,7 +137,7 @@ def test_the_numbers_come_even_if_the_disk_is_full(csv, capsys):
         predict.main([str(csv), '--html', '/dev/full'])
     assert ended.value.code == 2
     captured = capsys.readouterr()
-    assert captured.out.startswith('throw 1: measured from')
+    assert '\nthrow 1: measured from' in captured.out
     assert captured.err.endswith('cannot write it (No space left on device)\n')
     assert captured.err.count('\n') == 1
 
