@@ -53,7 +53,7 @@ bench-flights: setup-test ## measure flights per second
 bench-steps: setup-test ## draw the error over the step, in despun axes and in spinning ones
 	@$(BIN)/python benchmarks/steps.py --write
 
-bench: setup-test ## measure everything beside its peers, 6 minutes; writes docs/benchmarks.md and README
+bench: setup-test ## measure everything beside its peers, 7 minutes; writes docs/benchmarks.md and README
 	@$(BIN)/python benchmarks/run.py --write $(if $(PEERS),--peers '$(PEERS)')
 
 fuzz: setup-test ## fuzz every input, 10 minutes each (after .venv/bin/pip install -e .[fuzz])

@@ -1,7 +1,7 @@
 """Run all benchmarks, one after the other, and collect their results in one table.
 
 Each runs in its own process. Peers need their own environment (benchmarks/peers.py explains how to
-make it); without it their lines say so. Takes about 6 minutes on an idle machine.
+make it); without it their lines say so. Takes about 7 minutes on an idle machine.
 
 usage: benchmarks/run.py [--write] [--only NAME ...] [--peers PYTHON]
 """
@@ -29,9 +29,12 @@ from pages import Machine, Result, Run
 BENCHMARKS: dict[str, tuple[dict[str, Any], str]] = {
     'flights': ({}, ''),
     'ensemble': ({'largest': 1e6}, ''),
+    'sweep': ({}, ''),
+    'learning': ({}, ''),
     'steps': ({}, ''),
     'peers': ({'seconds': 3.0}, ''),
     'startup': ({}, ''),
+    'fly_bag': ({}, ''),
     'node': ({'seconds': 5.0}, ' 5'),
     'recorder': ({'seconds': 30.0}, ' 30'),
     'bag_writer': ({}, ''),
