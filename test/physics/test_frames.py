@@ -217,6 +217,8 @@ EXCEPTIONS = {
         'estimation/throw_fit.py',
         '-s.VY',
     ): 'how a landing moves with its height, in one system',
+    ('estimation/prior.py', '-self.spin.mean'): 'the other hand, in one system',
+    ('ros/recorder/diagnostics.py', '-r.before'): 'a count of messages, in descending order',
 }
 # physics/frames.py is the home of the turn; what numba compiles cannot import it.
 HOMES = ('physics/frames.py', 'physics/kernels/')
