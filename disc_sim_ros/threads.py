@@ -7,20 +7,19 @@ releases it, other threads wait for this lock without end, and so does the end o
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 import os
 from queue import Empty, SimpleQueue
 import signal
 import threading
-from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 import weakref
 
 _T = TypeVar('_T')
 
 
 class Threads:
-    """A fixed number of threads; use it in a `with` statement, or call `close`.
+    """A fixed number of threads; `close` ends them.
 
     One thread is the calling one.
     """
@@ -36,7 +35,7 @@ class Threads:
         self.count = count if most is None else max(min(count, most), 1)
         self._jobs: _Jobs = SimpleQueue()
         started = self.count if self.count > 1 else 0
-        with ctrl_c_waits():
+        with ctrl_c_waits() if started else nullcontext():
             for _ in range(started):
                 threading.Thread(target=_follow, args=(self._jobs,), daemon=True).start()
         self._end = weakref.finalize(self, _end, self._jobs, started)  # also without `close`
@@ -44,19 +43,6 @@ class Threads:
     def close(self) -> None:
         """End the threads."""
         self._end()
-
-    def __enter__(self) -> Self:
-        """Return the threads."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """End the threads."""
-        self.close()
 
     def run(self, work: Iterable[Callable[[], _T]], *, leave: bool = False) -> list[_T]:
         """Call functions side by side, and return their results in their order.

@@ -40,7 +40,7 @@ def parser(prog: str = 'predict') -> Parser:
         'FILE: a bag with nav_msgs/Odometry or geometry_msgs/PoseStamped, or a CSV file with the '
         'columns t_s, x_m, y_m, z_m (map: x forward, y left, z up) and, if attitudes were '
         'measured, qx, qy, qz, qw; a column `throw` separates several.',
-        epilog='Exit code 0; 1 if no throw was found; 2 for bad input.',
+        epilog='Exit code 0; 1: a bag cannot be read, or no throw was found; 2: bad input.',
     )
     p.set_defaults(prog=prog, outputs={'plot': output.check_plot, **pages.CHECKS})
     p.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
@@ -226,12 +226,11 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> st
         r = {name: x for name, x in row.items() if x is not None}
         r |= {name: system.number(x, 'm') for name, x in r.items() if name.endswith('_m')}
         until = r['measured_until_s']
-        stale = until < r['watched_s'] - _STALE
+        is_stale = until < r['watched_s'] - _STALE
+        stale = f'  nothing measured since {until:.2f} s' if is_stale else ''
         lines.append(
             f'  {r["watched_s"]:8.1f}  {r["x_m"]:7.2f}  {r["y_m"]:7.2f}  '
-            f'{r["sigma_x_m"]:7.2f} {r["sigma_y_m"]:7.2f}  {r["from_last_m"]:9.2f}'
-            + f'  nothing measured since {until:.2f} s'
-            * stale
+            f'{r["sigma_x_m"]:7.2f} {r["sigma_y_m"]:7.2f}  {r["from_last_m"]:9.2f}{stale}'
         )
     wind = system.number(last.wind[0], 'm/s'), system.text(last.wind[1], 'm/s', '.1f')
     lines.append(f'  estimated wind {wind[0]:.1f}, {wind[1]}')

@@ -63,13 +63,14 @@ def _interrupts_after_imports() -> Iterator[None]:
         return
     signal.signal(signal.SIGINT, _interrupt)
     # By way of SIGINT: another handler may stand there, such as that of `ctrl_c_waits`.
-    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     waiting = False
     try:
         yield
     finally:
         waiting = signal.setitimer(signal.ITIMER_REAL, 0.0)[0] > 0.0
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGALRM, before)
     if waiting:
         raise KeyboardInterrupt
 

@@ -1,6 +1,7 @@
 """Solve the least-squares problem: starts, robust loss, and the best parameters so far."""
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 import itertools
@@ -85,7 +86,7 @@ def cost_of_throw(problem: Problem, k: int, here: FloatArray) -> float:
 def _each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
     """Return the results for all throws, computed side by side."""
     n = len(problem.throws)
-    with Threads(most=n) as pool:
+    with closing(Threads(most=n)) as pool:
         return pool.run(partial(work, k) for k in range(n))
 
 

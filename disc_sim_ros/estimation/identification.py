@@ -1,6 +1,7 @@
 """From measured throws to the coefficients of a disc with standard errors: `identify`."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -266,7 +267,7 @@ def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, Floa
             progress('releases', done, float('nan'))
         return result
 
-    with Threads(most=len(problem.throws)) as pool:
+    with closing(Threads(most=len(problem.throws))) as pool:
         fitted = pool.run((partial(start, k) for k in range(len(problem.throws))), leave=True)
     problem = replace(problem, throws=tuple(alone.throw for alone in fitted))
     x = problem.means.copy()

@@ -1,6 +1,7 @@
 """Many flights at once, equal to those of `flight.fly`: in SIMD registers, on all cores."""
 
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 import math
@@ -150,7 +151,7 @@ def fly_many(
             common.fly_in_gusts(row[np.newaxis], i, int(gust_seeds[i]), space)
 
     starts = range(0, n, chunk)
-    with Threads(threads, most=len(starts)) as pool:
+    with closing(Threads(threads, most=len(starts))) as pool:
         pool.run(partial(work, start) for start in starts)
     return Landings(*ends)
 

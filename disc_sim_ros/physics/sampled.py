@@ -1,5 +1,6 @@
 """Flights from any state, sampled at any times: the model that estimators fit to measurements."""
 
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 import os
@@ -123,7 +124,7 @@ def fly_sampled(
 
     parts = max(min(threads, os.cpu_count() or 1, -(-n // _FLIGHTS_A_THREAD)), 1)
     size = -(-n // (parts * WIDTH)) * WIDTH
-    with Threads(parts) as pool:
+    with closing(Threads(parts)) as pool:
         pool.run(partial(work, i, min(i + size, n)) for i in range(0, n, max(size, 1)))
     return Sampled(*out)
 

@@ -1,6 +1,7 @@
 """Samples of the unit cube: sample i depends only on the seed and on i, in any batch."""
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,8 +76,8 @@ def _scrambled_basis(dimensions: int, seed: int, bits: int) -> tuple[IntArray, I
 
 
 @lru_cache(maxsize=1)
-def load_sobol() -> None:
-    """Let scipy read the table of its Sobol sequence, once, with Ctrl-C held back.
+def load_sobol() -> Any:
+    """Return `scipy.stats.qmc`, which has read its Sobol table once, with Ctrl-C held back.
 
     The compiled code of scipy prints a KeyboardInterrupt there, and goes on with half a table.
     """
@@ -84,15 +85,13 @@ def load_sobol() -> None:
         from scipy.stats import qmc  # noqa: PLC0415 - it takes a second, and only Sobol needs it
 
         qmc.Sobol(1, scramble=False)
+    return qmc
 
 
 @lru_cache(maxsize=8)
 def _sobol_basis(dimensions: int, bits: int) -> IntArray:
     """Return the direction numbers of scipy's Sobol sequence, shape (bits, dimensions)."""
-    load_sobol()
-    from scipy.stats import qmc  # noqa: PLC0415
-
-    sequence = qmc.Sobol(dimensions, scramble=False)
+    sequence = load_sobol().Sobol(dimensions, scramble=False)
     basis = np.zeros((bits, dimensions), dtype=np.int64)
     for j in range(bits):
         sequence.fast_forward(2**j - sequence.num_generated)

@@ -1,5 +1,6 @@
 """Work side by side: results in order, errors reach the caller, and Ctrl-C blocks nothing."""
 
+from contextlib import closing
 import gc
 import subprocess
 import sys
@@ -51,7 +52,7 @@ def test_results_come_in_the_order_of_the_work(count):
         time.sleep(0.002 * (i % 3))
         return i
 
-    with Threads(count) as threads:
+    with closing(Threads(count)) as threads:
         assert threads.run((lambda i=i: late(i)) for i in range(20)) == list(range(20))
         assert threads.run([]) == []
 
@@ -67,7 +68,7 @@ def test_an_error_reaches_the_caller_after_the_end_of_what_runs(count):
         time.sleep(0.02)
         ends.append(i)
 
-    with Threads(count) as threads:
+    with closing(Threads(count)) as threads:
         with pytest.raises(ValueError, match='one'):
             threads.run((lambda i=i: work(i)) for i in range(1000))
         assert len(starts) == len(ends) + 1 < 1000
@@ -90,7 +91,7 @@ def test_threads_end_with_their_object():
 
 def test_no_more_threads_than_are_of_use():
     for wanted, most, count in ((4, 2, 2), (2, None, 2), (4, 0, 1)):
-        with Threads(wanted, most) as threads:
+        with closing(Threads(wanted, most)) as threads:
             assert threads.count == count
 
 
@@ -100,6 +101,6 @@ def test_what_takes_long_is_left_to_itself_after_an_error():
     def fail():
         raise ValueError('none')
 
-    with Threads(2) as threads, pytest.raises(ValueError, match='none'):
+    with closing(Threads(2)) as threads, pytest.raises(ValueError, match='none'):
         threads.run([go_on.wait, fail], leave=True)
     go_on.set()

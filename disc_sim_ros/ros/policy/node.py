@@ -135,11 +135,13 @@ class PolicyNode(Node):
 
     def _end(self, numbers: tuple[float, ...]) -> None:
         self._pilot.land()
-        x, y = numbers[:2]
-        miss = math.dist((x, y), self._pilot.target)
-        self._landing = f'landed at x {x:.2f} m, y {y:.2f} m, {miss:.2f} m from the target'
-        if self._ending[1] != topics.FlightEvent.LANDED:
-            self._landing = f'the flight ended without a landing: {self._ending[1]}'
+        ending = self._ending[1]
+        if ending == topics.FlightEvent.LANDED:
+            x, y = numbers[:2]
+            miss = math.dist((x, y), self._pilot.target)
+            self._landing = f'landed at x {x:.2f} m, y {y:.2f} m, {miss:.2f} m from the target'
+        else:
+            self._landing = f'the flight ended without a landing: {ending}'
         self.get_logger().info(self._landing)
         self._ended = self._lockstep
 

@@ -135,47 +135,66 @@ def test_intercept_is_where_a_straight_path_crosses_the_plane(normal, point, t):
     assert crossing.header.frame_id == 'map'
 
 
-def test_node_follows_a_throw(ros_context):
-    """A throw with attitudes, with its own stamps; a pose that is not finite between them."""
-    flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 4)
-    chosen = [
-        Parameter('disc_uncertainty', value=0.0),
-        Parameter('discs', value='wraith ultrastar'),
-    ]
-    node = PredictorNode(context=ros_context, parameter_overrides=chosen)
-    peer = Node('tracker', context=ros_context, start_parameter_services=False)
-    executor = SingleThreadedExecutor(context=ros_context)
-    executor.add_node(node)
-    executor.add_node(peer)
-    got = {name: [] for name in KINDS}
-    for name, (kind, topic) in KINDS.items():
-        peer.create_subscription(kind, topic, got[name].append, STATE_QOS)
-    publisher = peer.create_publisher(PoseStamped, PredictorTopic.MEASURED_POSE, STATE_QOS)
+class Tracking:
+    """A predictor node and a tracker that measures the disc, spun by one executor."""
 
-    def spin_until(condition):
+    def __init__(self, context, discs: str) -> None:
+        self.flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 4)
+        chosen = {'disc_uncertainty': 0.0, 'discs': discs}
+        parameters = [Parameter(name, value=value) for name, value in chosen.items()]
+        self.node = PredictorNode(context=context, parameter_overrides=parameters)
+        self.tracker = Node('tracker', context=context, start_parameter_services=False)
+        self._publisher = self.tracker.create_publisher(
+            PoseStamped, PredictorTopic.MEASURED_POSE, STATE_QOS
+        )
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+        self._executor.add_node(self.tracker)
+
+    def start(self, matched) -> None:
+        self.spin_until(lambda: self._publisher.get_subscription_count() and matched())
+        self.node.start()
+
+    def spin_until(self, condition) -> None:
         end = time.monotonic() + DEADLINE
         while not condition():
             assert time.monotonic() < end
-            executor.spin_once(0.01)
+            self._executor.spin_once(0.01)
 
-    spin_until(
-        lambda: publisher.get_subscription_count() and node.count_subscribers('predicted_landing')
-    )
-    node.start()
+    def publish(self, message: PoseStamped) -> None:
+        self._publisher.publish(message)
+        self._executor.spin_once(0.01)
+
+    def publish_flight(self, stop: int | None = None) -> None:
+        flown = self.flown
+        rows = list(zip(flown.time, flown.position, flown.axis, strict=True))
+        for t, position, axis in rows[:stop]:
+            self.publish(pose(100.0 + t, position, axis))
+
+    def end(self) -> None:
+        assert self.node.stop() == ''
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self.tracker.destroy_node()
+
+
+def test_node_follows_a_throw(ros_context):
+    """A throw with attitudes, with its own stamps; a pose that is not finite between them."""
+    tracking = Tracking(ros_context, discs='wraith ultrastar')
+    node, flown = tracking.node, tracking.flown
+    got = {name: [] for name in KINDS}
+    for name, (kind, topic) in KINDS.items():
+        tracking.tracker.create_subscription(kind, topic, got[name].append, STATE_QOS)
     try:
-        publisher.publish(pose(100.0, (math.nan, 0.0, 1.0)))
-        spin_until(lambda: node.refused == 1)
-        for t, position, axis in zip(flown.time, flown.position, flown.axis, strict=True):
-            publisher.publish(pose(100.0 + t, position, axis))
-            executor.spin_once(0.01)
+        tracking.start(lambda: node.count_subscribers('predicted_landing'))
+        tracking.publish(pose(100.0, (math.nan, 0.0, 1.0)))
+        tracking.spin_until(lambda: node.refused == 1)
+        tracking.publish_flight()
         end = 100.0 + flown.landing[2]
-        spin_until(lambda: got['estimate'] and stamp(got['estimate'][-1]) > end - 0.03)
-        spin_until(lambda: all(got.values()))
+        tracking.spin_until(lambda: got['estimate'] and stamp(got['estimate'][-1]) > end - 0.03)
+        tracking.spin_until(lambda: all(got.values()))
     finally:
-        assert node.stop() == ''
-        executor.shutdown()
-        node.destroy_node()
-        peer.destroy_node()
+        tracking.end()
     last = got['landing'][-1]
     at = last.pose.pose.position
     assert math.dist((at.x, at.y), flown.landing[:2]) < 0.1  # noise of 2 cm
@@ -198,44 +217,24 @@ def test_node_follows_a_throw(ros_context):
 
 def test_a_throw_whose_measurements_end_is_not_followed(ros_context):
     """The tracker dies while the disc flies."""
-    flown = throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 4)
-    chosen = [Parameter('disc_uncertainty', value=0.0), Parameter('discs', value='ultrastar')]
-    node = PredictorNode(context=ros_context, parameter_overrides=chosen)
-    peer = Node('tracker', context=ros_context, start_parameter_services=False)
-    executor = SingleThreadedExecutor(context=ros_context)
-    executor.add_node(node)
-    executor.add_node(peer)
+    tracking = Tracking(ros_context, discs='ultrastar')
     arrays = []
-    peer.create_subscription(DiagnosticArray, '/diagnostics', arrays.append, 10)
-    publisher = peer.create_publisher(PoseStamped, PredictorTopic.MEASURED_POSE, STATE_QOS)
-
-    def spin_until(condition):
-        end = time.monotonic() + DEADLINE
-        while not condition():
-            assert time.monotonic() < end
-            executor.spin_once(0.01)
+    tracking.tracker.create_subscription(DiagnosticArray, '/diagnostics', arrays.append, 10)
 
     def says(text, level):
         return any(
             s.message.startswith(text) and s.level == level for a in arrays for s in a.status
         )
 
-    spin_until(publisher.get_subscription_count)
-    node.start()
     try:
-        spin_until(lambda: says('waiting for a throw', DiagnosticStatus.OK))
-        rows = list(zip(flown.time, flown.position, flown.axis, strict=True))
-        for t, position, axis in rows[: len(rows) // 3]:
-            publisher.publish(pose(100.0 + t, position, axis))
-            executor.spin_once(0.01)
-        spin_until(lambda: node.predictions > 3)
+        tracking.start(lambda: True)
+        tracking.spin_until(lambda: says('waiting for a throw', DiagnosticStatus.OK))
+        tracking.publish_flight(stop=len(tracking.flown.time) // 3)
+        tracking.spin_until(lambda: tracking.node.predictions > 3)
         text = 'in a throw of which nothing was measured for '
-        spin_until(lambda: says(text, DiagnosticStatus.WARN))
+        tracking.spin_until(lambda: says(text, DiagnosticStatus.WARN))
     finally:
-        assert node.stop() == ''
-        executor.shutdown()
-        node.destroy_node()
-        peer.destroy_node()
+        tracking.end()
 
 
 def stamp(message) -> float:
