@@ -12,6 +12,8 @@ from disc_sim_ros import topics
 from disc_sim_ros.analysis.flight_report import columns
 from disc_sim_ros.errors import printable
 from disc_sim_ros.palette import COLOURS
+from disc_sim_ros.plot_axes import label
+from disc_sim_ros.units import METRIC, System
 
 if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly` does without
     from collections.abc import Sequence
@@ -39,8 +41,11 @@ _STYLES = ('-', '--', ':')
 _LEGEND_LIMIT = 8  # flights in a legend, at most
 
 
-def flight_figure(flight: 'Flight') -> Figure:
-    """Return a figure of a sampled flight: side and top view to scale, and its time histories."""
+def flight_figure(flight: 'Flight', system: System = METRIC) -> Figure:
+    """Return a figure of a sampled flight: side and top view to scale, and its time histories.
+
+    Numbers are in the units of a system, also in the other figures.
+    """
     samples = columns(flight.trajectory)
     x, y, z = samples['position_m'].T
     figure = Figure(figsize=(11, 9), layout='constrained')
@@ -48,20 +53,20 @@ def flight_figure(flight: 'Flight') -> Figure:
     grid = figure.add_gridspec(4, 2, height_ratios=(1.2, 1, 1, 1))
     side = figure.add_subplot(grid[0, 0])
     top = figure.add_subplot(grid[0, 1])
-    for axis, across, label in ((side, z, 'height z, m'), (top, y, 'left y, m')):
+    for axis, across in ((side, z), (top, y)):
         axis.plot(x, across, color=BLUE)
         axis.plot(x[0], across[0], 'o', color='black', label='release')
-        axis.set(xlabel='forward x, m', ylabel=label)
-        axis.set_aspect('equal', adjustable='datalim')
+    _label_views(side, top, system)
     if flight.landed:
         for axis, across in ((side, 0.0), (top, flight.position[1])):
             axis.plot(flight.position[0], across, 'x', color=ORANGE, ms=9, mew=2, label='landing')
         side.axhline(0.0, color='0.6', lw=0.8)
     side.legend(loc='best')
-    for i, (name, label) in enumerate(_HISTORIES):
+    for i, (name, text) in enumerate(_HISTORIES):
         axis = figure.add_subplot(grid[1 + i // 2, i % 2])
         axis.plot(samples['t_s'], samples[name], color=BLUE)
-        axis.set(xlabel='time, s', ylabel=label)
+        axis.set_xlabel('time, s')
+        label(axis.yaxis, text, system)
     ratio = axis.twinx()
     ratio.plot(samples['t_s'], samples['advance_ratio'], color=ORANGE, ls='--')
     ratio.set_ylabel('advance ratio (dashed)')
@@ -69,15 +74,18 @@ def flight_figure(flight: 'Flight') -> Figure:
         axis.grid(alpha=0.3)
     launch = flight.launch
     figure.suptitle(
-        f'{printable(flight.setup.disc.name)}, {flight.setup.model} model: {launch.speed:g} m/s, '
-        f'pitch {launch.pitch:g}°, roll {launch.roll:g}°, spin {launch.spin:g} rad/s; '
-        f'{flight.range:.1f} m in {flight.time:.2f} s',
+        f'{printable(flight.setup.disc.name)}, {flight.setup.model} model: '
+        f'{system.text(launch.speed, "m/s", ".4g")}, pitch {launch.pitch:g}°, '
+        f'roll {launch.roll:g}°, spin {system.text(launch.spin, "rad/s", ".4g")}; '
+        f'{system.text(flight.range, "m", ".1f")} in {flight.time:.2f} s',
         parse_math=False,  # a file may have dollars in its name
     )
     return figure
 
 
-def comparison_figure(flights: 'Sequence[Flight]', names: 'Sequence[str]') -> Figure:
+def comparison_figure(
+    flights: 'Sequence[Flight]', names: 'Sequence[str]', system: System = METRIC
+) -> Figure:
     """Return a figure of several sampled flights: side view and top view to scale."""
     figure = Figure(figsize=(11, 8), layout='constrained')
     FigureCanvasAgg(figure)
@@ -89,9 +97,8 @@ def comparison_figure(flights: 'Sequence[Flight]', names: 'Sequence[str]') -> Fi
             axis.plot(x, across, color=colour, ls=style, label=text_of(name))
             if flight.landed:
                 axis.plot(flight.position[0], end, 'x', color=colour, ms=9, mew=2)
-    for axis, across in ((side, 'height z, m'), (top, 'left y, m')):
-        axis.set(xlabel='forward x, m', ylabel=across)
-        axis.set_aspect('equal', adjustable='datalim')
+    _label_views(side, top, system)
+    for axis in (side, top):
         axis.grid(alpha=0.3)
     side.axhline(0.0, color='0.6', lw=0.8)
     if any(flight.landed for flight in flights):
@@ -100,7 +107,7 @@ def comparison_figure(flights: 'Sequence[Flight]', names: 'Sequence[str]') -> Fi
     return figure
 
 
-def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
+def bag_figure(analyses: 'Sequence[Analysis]', heading: str, system: System = METRIC) -> Figure:
     """Return a figure of one or more recorded flights.
 
     Side and top view to scale, height, airspeed, angle of attack and spin over the time since
@@ -118,16 +125,15 @@ def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
         name = text_of(f'{a.flight.disc.name}, flight {a.flight.number}')
         _views(side, top, a, colour, name)
         _histories(histories, a, colour)
-    for axis, across in ((side, 'height z, m'), (top, 'left y, m')):
-        axis.set(xlabel='forward x, m', ylabel=across)
-        axis.set_aspect('equal', adjustable='datalim')
+    _label_views(side, top, system)
     side.axhline(0.0, color='0.6', lw=0.8)
     if 1 < len(analyses) <= _LEGEND_LIMIT:
         side.legend(loc='best')
     air = 'airspeed' if any(a.wind_is_known for a in analyses) else 'speed over the ground'
     labels = ('height, m', f'{air}, m/s', 'angle of attack, °', 'spin, rad/s')
-    for axis, label in zip(histories, labels, strict=True):
-        axis.set(xlabel='time, s', ylabel=label)
+    for axis, text in zip(histories, labels, strict=True):
+        axis.set_xlabel('time, s')
+        label(axis.yaxis, text, system)
     for i, topic in enumerate(inputs):
         place = grid[3, :] if len(inputs) == 1 else grid[3, i]
         _steering(figure.add_subplot(place), analyses, topic)
@@ -135,6 +141,13 @@ def bag_figure(analyses: 'Sequence[Analysis]', heading: str) -> Figure:
         axis.grid(alpha=0.3)
     figure.suptitle(printable(heading), parse_math=False)  # a path may have dollars in it
     return figure
+
+
+def _label_views(side: 'Axes', top: 'Axes', system: System) -> None:
+    for axis, across in ((side, 'height z, m'), (top, 'left y, m')):
+        label(axis.xaxis, 'forward x, m', system)
+        label(axis.yaxis, across, system)
+        axis.set_aspect('equal', adjustable='datalim')
 
 
 def text_of(name: str) -> str:
@@ -166,7 +179,7 @@ def _histories(histories: 'Sequence[Axes]', a: 'Analysis', colour: str) -> None:
 
 def _steering(axis: 'Axes', analyses: 'Sequence[Analysis]', topic: str) -> None:
     """Draw the inputs of a topic as steps."""
-    names, label = _INPUT_LABELS[topic]
+    names, text = _INPUT_LABELS[topic]
     steered = [(i, a, _inputs(a, topic)) for i, a in enumerate(analyses) if _inputs(a, topic)]
     for i, a, changes in steered:
         times = [a.flight.time_of(c.stamp) for c in changes]
@@ -182,7 +195,7 @@ def _steering(axis: 'Axes', analyses: 'Sequence[Analysis]', topic: str) -> None:
                 ls=_STYLES[j],
                 label=name if a is steered[0][1] else None,
             )
-    axis.set(xlabel='time, s', ylabel=label)
+    axis.set(xlabel='time, s', ylabel=text)
     axis.legend(loc='best')
 
 

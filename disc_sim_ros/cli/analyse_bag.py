@@ -148,7 +148,7 @@ def _plot(name: str, chosen: argparse.Namespace, analyses: 'Sequence[Analysis]')
     system = SYSTEMS[chosen.units]
     one = len(analyses) == 1
     title = bag_report.title(analyses[0], system) if one else Path(chosen.bag).name
-    output.write_plot(name, plots.bag_figure(analyses, title))
+    output.write_plot(name, plots.bag_figure(analyses, title, system))
 
 
 def _write_page(chosen: argparse.Namespace, analyses: 'Sequence[Analysis]') -> str:

@@ -165,7 +165,7 @@ def _record(
 
     control = flags.control_of(chosen)
     parameters |= {'auto_throw': False, 'command_timeout': WHOLE_FLIGHT}
-    progress = _Progress(chosen.prog)
+    progress = _Progress(chosen.prog, SYSTEMS[chosen.units])
     with ExitStack() as stack:
         domain = stack.enter_context(processes.own_domain())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='demo_')))
@@ -181,7 +181,8 @@ def _record(
         watcher.wait_until_recorded(bag)
         if any((control.C_L, control.C_M, control.C_N)):
             watcher.steer(control)
-        progress.line(f'throwing {chosen.disc} at {chosen.speed:g} m/s')
+        speed = SYSTEMS[chosen.units].text(chosen.speed, 'm/s', 'g')
+        progress.line(f'throwing {chosen.disc} at {speed}')
         watcher.throw()
         ended = watcher.watch(chosen.seconds, progress.show)
         progress.line(ended)
@@ -194,8 +195,8 @@ def _record(
 class _Progress:
     """Lines on stderr; on a terminal also the state of the disc, in a line that is updated."""
 
-    def __init__(self, prog: str) -> None:
-        self._prog = prog
+    def __init__(self, prog: str, system: System) -> None:
+        self._prog, self._system = prog, system
         self._live = sys.stderr.isatty()
         self._open = False
 
@@ -208,10 +209,9 @@ class _Progress:
     def show(self, sample: 'DiscSample') -> None:
         """Show the state of the disc, on a terminal."""
         if self._live:
-            sys.stderr.write(
-                f'\r  {sample.time:5.1f} s  height {sample.height:6.2f} m  '
-                f'speed {sample.speed:5.2f} m/s '
-            )
+            height = self._system.text(sample.height, 'm', '6.2f')
+            speed = self._system.text(sample.speed, 'm/s', '5.2f')
+            sys.stderr.write(f'\r  {sample.time:5.1f} s  height {height}  speed {speed} ')
             sys.stderr.flush()
             self._open = True
 
@@ -228,7 +228,7 @@ def _report(bag: Path, plot: Path, system: System) -> int:
     if not analyses:
         raise DiscSimError(f'{bag}: the bag does not hold the throw')
     title = bag_report.title(analyses[0], system)
-    image = plots.image(plots.bag_figure(analyses, title), 'png')
+    image = plots.image(plots.bag_figure(analyses, title, system), 'png')
     output.write_whole('--bag', str(plot), image)
     page = _page(bag, plot.with_suffix('.html'), analyses, system)
     size = sum(file.stat().st_size for file in opened.files)

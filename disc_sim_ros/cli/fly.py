@@ -157,7 +157,7 @@ def _report(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     elif plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
 
-        output.write_plot(plot, plots.flight_figure(flown))
+        output.write_plot(plot, plots.flight_figure(flown, SYSTEMS[chosen.units]))
         lines.append(f'  wrote   {plot}')
     elif write is not None:
         lines.append(f'  wrote   {write()}')
@@ -203,7 +203,7 @@ def _compare(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     if plot is not None:
         from disc_sim_ros.analysis import plots  # noqa: PLC0415 - matplotlib takes half a second
 
-        output.write_plot(plot, plots.comparison_figure(flights, names))
+        output.write_plot(plot, plots.comparison_figure(flights, names, SYSTEMS[chosen.units]))
         lines.append(f'wrote {plot}')
     output.show('\n'.join(lines))
     return flown

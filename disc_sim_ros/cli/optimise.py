@@ -149,7 +149,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     if plot is not None:
         from disc_sim_ros.studies.optimise_plots import figure  # noqa: PLC0415 - matplotlib
 
-        output.write_plot(plot, figure(optimum))
+        output.write_plot(plot, figure(optimum, SYSTEMS[chosen.units]))
     if chosen.json:
         document = optimise_report.optimum_document(optimum, command)
         output.show(json.dumps(document, allow_nan=False))

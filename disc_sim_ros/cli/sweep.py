@@ -136,7 +136,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     if plot is not None:
         from disc_sim_ros.studies.plots import figure  # noqa: PLC0415 - matplotlib
 
-        output.write_plot(plot, figure(path, summarised))
+        output.write_plot(plot, figure(path, summarised, SYSTEMS[chosen.units]))
     if chosen.json:
         output.show(json.dumps(report.summary_document(summarised), allow_nan=False))
         return 0

@@ -7,15 +7,20 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.plot_axes import label
 from disc_sim_ros.studies.columns import quantity
 from disc_sim_ros.studies.optimise import Optimum, lines
 from disc_sim_ros.studies.optimise_report import WHAT, named_value, statistic_of, still_flight
+from disc_sim_ros.units import METRIC, System
 
 BLUE, ORANGE = '#0072b2', '#d55e00'  # Okabe and Ito: safe for every eye
 
 
-def figure(optimum: Optimum) -> Figure:
-    """Return a plot of the flight of an optimum, and of the result along each free quantity."""
+def figure(optimum: Optimum, system: System = METRIC) -> Figure:
+    """Return a plot of the flight of an optimum, and of the result along each free quantity.
+
+    Numbers are in the units of a system.
+    """
     problem = optimum.problem
     what, unit = WHAT[problem.goal]
     curves = lines(problem, optimum.launch)
@@ -26,7 +31,7 @@ def figure(optimum: Optimum) -> Figure:
     grid = page.add_gridspec(rows, 2 * columns)
     flight = still_flight(optimum, 100.0)
     x, y, z = map_from_paper(flight.trajectory.position).T
-    for side, across, label in ((0, z, 'height z, m'), (1, y, 'left y, m')):
+    for side, across, text in ((0, z, 'height z, m'), (1, y, 'left y, m')):
         axis = page.add_subplot(grid[0, side * columns : (side + 1) * columns])
         axis.plot(x, across, color=BLUE)
         axis.plot(0.0, across[0], 'k^', label='release')
@@ -35,7 +40,8 @@ def figure(optimum: Optimum) -> Figure:
         if problem.scatters and side:
             landed = problem.landings(np.array([list(optimum.launch.values())]), _dots(optimum))
             axis.plot(landed.x, landed.y, '.', color=BLUE, ms=3, alpha=0.5, label='landings')
-        axis.set(xlabel='forward x, m', ylabel=label)
+        label(axis.xaxis, 'forward x, m', system)
+        label(axis.yaxis, text, system)
         axis.set_aspect('equal', adjustable='datalim')
         axis.grid(alpha=0.3)
         axis.legend(loc='best', fontsize=9)
@@ -44,14 +50,16 @@ def figure(optimum: Optimum) -> Figure:
         axis = page.add_subplot(grid[1 + k // columns, column : column + 2])
         axis.plot(at, values, color=BLUE)
         axis.axvspan(*optimum.flat[name], color=ORANGE, alpha=0.2,
-                     label=f'within {optimum.slack:.2g} {unit}')  # fmt: skip
+                     label=f'within {system.text(optimum.slack, unit, ".2g")}')  # fmt: skip
         best = values[int(np.searchsorted(at, optimum.launch[name]))]
         axis.plot(optimum.launch[name], best, '*', color=ORANGE, ms=13, label='optimum')
-        axis.set(xlabel=quantity('', name).label, ylabel=f'{statistic_of(optimum)}{what}, {unit}')
+        label(axis.xaxis, quantity('', name).label, system)
+        label(axis.yaxis, f'{statistic_of(optimum)}{what}, {unit}', system)
         axis.grid(alpha=0.3)
         axis.legend(loc='best', fontsize=9)
-    aim = f' at {problem.target[0]:g}, {problem.target[1]:g} m' if problem.target else ''
-    launch = ', '.join(named_value(name, value) for name, value in optimum.launch.items())
+    target = [system.number(value, 'm') for value in problem.target or ()]
+    aim = ' at {:.4g}, {:.4g} '.format(*target) + system.length if target else ''
+    launch = ', '.join(named_value(name, value, system) for name, value in optimum.launch.items())
     page.suptitle(
         f'{problem.study.setup.disc.name}, best {problem.goal}{aim}: {launch}',
         fontsize=11,

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.plot_axes import label
 from disc_sim_ros.studies import report, tables
 from disc_sim_ros.studies.columns import RESULTS, quantity
 from disc_sim_ros.studies.summary import (
@@ -19,6 +20,7 @@ from disc_sim_ros.studies.summary import (
     expected_status,
     radius2,
 )
+from disc_sim_ros.units import METRIC, System
 
 BLUE, ORANGE, GREEN = '#0072b2', '#d55e00', '#009e73'  # Okabe and Ito: safe for every eye
 _COLOURS = {'range_m': BLUE, 'drift_m': ORANGE, 'time_s': GREEN}
@@ -27,7 +29,7 @@ _CELLS = 120  # of the density, along its longer side
 _MOST_BARS = 12
 
 
-def figure(flights: Path | tables.Columns, summary: Summary) -> Figure:
+def figure(flights: Path | tables.Columns, summary: Summary, system: System = METRIC) -> Figure:
     """Return the plot of a study.
 
     Without a grid: landings and sensitivities. With a grid of one quantity: curves; of two: maps;
@@ -36,6 +38,7 @@ def figure(flights: Path | tables.Columns, summary: Summary) -> Figure:
     Args:
         flights: File of `runner.sweep`, or columns of `runner.collect`.
         summary: Summary of the flights.
+        system: Units of the numbers.
     """
     dimensions = len(summary.study.vary)
     page = Figure(figsize=(12, 6.5), layout='constrained')
@@ -46,23 +49,26 @@ def figure(flights: Path | tables.Columns, summary: Summary) -> Figure:
             _sensitivities(right, summary)
         else:
             left = page.subplots()
-        _landings(left, flights, summary)
+        _landings(left, flights, summary, system)
     elif dimensions == 1:
-        _curves(page, summary)
+        _curves(page, summary, system)
     elif dimensions == 2:
-        _maps(page, summary)
+        _maps(page, summary, system)
     else:
-        _best_curves(page, summary)
+        _best_curves(page, summary, system)
     page.suptitle(
-        f'{report.headline(summary)}\n{report.study_text(summary.study)}',
+        f'{report.headline(summary)}\n{report.study_text(summary.study, system)}',
         fontsize=11,
         parse_math=False,  # the name of a disc file may contain dollars
     )
     return page
 
 
-def _landings(axis: Axes, flights: Path | tables.Columns, summary: Summary) -> None:
-    axis.set(xlabel=RESULTS['x_m'], ylabel=RESULTS['y_m'])
+def _landings(
+    axis: Axes, flights: Path | tables.Columns, summary: Summary, system: System
+) -> None:
+    label(axis.xaxis, RESULTS['x_m'], system)
+    label(axis.yaxis, RESULTS['y_m'], system)
     axis.set_aspect('equal', adjustable='datalim')
     axis.grid(alpha=0.3)
     axis.plot(0, 0, 'k^', label='release')
@@ -88,9 +94,9 @@ def _landings(axis: Axes, flights: Path | tables.Columns, summary: Summary) -> N
             density += np.histogram2d(
                 chunk['x_m'][chosen], chunk['y_m'][chosen], (x_edges, y_edges)
             )[0]
-        shown = np.ma.masked_equal(density.T / size**2, 0.0)
+        shown = np.ma.masked_equal(density.T / system.number(size, 'm') ** 2, 0.0)
         mesh = axis.pcolormesh(x_edges, y_edges, shown, cmap='Blues', norm=LogNorm())
-        axis.figure.colorbar(mesh, ax=axis, label='landings per m²', shrink=0.8)
+        axis.figure.colorbar(mesh, ax=axis, label=f'landings per {system.length}²', shrink=0.8)
     if summary.ellipse is not None and summary.study.count > 1:
         _ellipses(axis, summary.ellipse)
     axis.legend(loc='best', fontsize=9)
@@ -117,8 +123,8 @@ def _sensitivities(axis: Axes, summary: Summary) -> None:
     place = np.arange(len(names))
     for k, result in enumerate(MAIN_RESULTS):
         lengths = [bars.get((name, result), 0.0) for name in names]
-        label = f'{result.rpartition("_")[0]}, R² {summary.explained.get(result, 0.0):.2f}'
-        axis.barh(place + 0.26 * (1 - k), lengths, 0.24, color=_COLOURS[result], label=label)
+        text = f'{result.rpartition("_")[0]}, R² {summary.explained.get(result, 0.0):.2f}'
+        axis.barh(place + 0.26 * (1 - k), lengths, 0.24, color=_COLOURS[result], label=text)
     axis.set_yticks(place, [name.replace('_', ' ') for name in names])
     axis.axvline(0.0, color='black', lw=0.8)
     axis.set(xlabel='sd of the result per sd of the quantity (linear regression)')
@@ -126,7 +132,7 @@ def _sensitivities(axis: Axes, summary: Summary) -> None:
     axis.legend(loc='best', fontsize=9)
 
 
-def _curves(page: Figure, summary: Summary) -> None:
+def _curves(page: Figure, summary: Summary, system: System) -> None:
     ((name, values),) = summary.study.vary.items()
     mean, sd = _grid(summary)
     order = np.argsort(values)
@@ -140,41 +146,42 @@ def _curves(page: Figure, summary: Summary) -> None:
         if summary.study.count > 1:
             axis.fill_between(x, y - width, y + width, color=colour, alpha=0.25, label='± 1 sd')
             axis.legend(loc='best', fontsize=9)
-        axis.set_ylabel(RESULTS[result])
+        label(axis.yaxis, RESULTS[result], system)
         axis.grid(alpha=0.3)
-    axis.set_xlabel(quantity('name', name).label)
+    label(axis.xaxis, quantity('name', name).label, system)
 
 
-def _maps(page: Figure, summary: Summary) -> None:
+def _maps(page: Figure, summary: Summary, system: System) -> None:
     (x_name, x), (y_name, y) = summary.study.vary.items()
     mean, _ = _grid(summary)
     x_order, y_order = np.argsort(x), np.argsort(y)
     for axis, result in zip(page.subplots(1, 2), ('range_m', 'time_s'), strict=True):
         column = mean[:, MAIN_RESULTS.index(result)].reshape(len(x), len(y))
-        values = column[np.ix_(x_order, y_order)].T
+        unit = result.rpartition('_')[2]
+        values = system.number(column[np.ix_(x_order, y_order)].T, unit)
         x_line, y_line = np.asarray(x)[x_order], np.asarray(y)[y_order]
         mesh = axis.pcolormesh(x_line, y_line, values, cmap='viridis', shading='nearest')
         if min(values.shape) > 2 and np.nanmin(values) < np.nanmax(values):
             lines = axis.contour(x_line, y_line, values, 8, colors='white', linewidths=0.8)
             axis.clabel(lines, fontsize=8)
-        axis.figure.colorbar(mesh, ax=axis, label=RESULTS[result])
+        what = RESULTS[result].rpartition(', ')[0]
+        axis.figure.colorbar(mesh, ax=axis, label=f'{what}, {system.unit(unit)}')
         best = next(b for b in summary.best if b.result == result)
-        label = f'best, {best.mean:.2f} {result.rpartition("_")[2]}'
         axis.plot(
             best.values[x_name], best.values[y_name], '*', ms=14, mfc=ORANGE, mec='white',
-            label=label, clip_on=False,
+            label=f'best, {system.text(best.mean, unit)}', clip_on=False,
         )  # fmt: skip
         axis.legend(loc='best', fontsize=9)
-        axis.set(xlabel=quantity('name', x_name).label, ylabel=quantity('name', y_name).label)
+        label(axis.xaxis, quantity('name', x_name).label, system)
+        label(axis.yaxis, quantity('name', y_name).label, system)
 
 
-def _best_curves(page: Figure, summary: Summary) -> None:
+def _best_curves(page: Figure, summary: Summary, system: System) -> None:
     """Draw for each quantity the best mean result over all other quantities."""
     study = summary.study
     mean = _grid(summary)[0].reshape((*study.shape, len(MAIN_RESULTS)))
     axes = page.subplots(2, len(study.shape), squeeze=False, sharey='row')
     for row, result in zip(axes, ('range_m', 'time_s'), strict=True):
-        row[0].set_ylabel(f'greatest {RESULTS[result]}')
         best = next(b for b in summary.best if b.result == result)
         for i, (name, values) in enumerate(study.vary.items()):
             others = tuple(k for k in range(len(study.shape)) if k != i)
@@ -183,8 +190,9 @@ def _best_curves(page: Figure, summary: Summary) -> None:
             x = np.asarray(values)[order]
             row[i].plot(x, top[order], marker='.', color=_COLOURS[result])
             row[i].plot(best.values[name], best.mean, '*', ms=13, color=ORANGE, label='best')
-            row[i].set_xlabel(quantity('name', name).label)
+            label(row[i].xaxis, quantity('name', name).label, system)
             row[i].grid(alpha=0.3)
+        label(row[0].yaxis, f'greatest {RESULTS[result]}', system)
     axes[0, 0].legend(loc='best', fontsize=9)
 
 

@@ -46,24 +46,32 @@ def headline(summary: Summary) -> str:
     return f'{flights}: {", ".join(ends)}'
 
 
-def study_text(study: Study) -> str:
+def study_text(study: Study, system: System = METRIC) -> str:
     """Return one line: the quantities that differ from flight to flight, and the wind."""
     parts = []
+
+    def add(name: str, *values: float, form: str) -> None:
+        q = quantity('name', name)
+        numbers = form.format(*(system.number(value, q.short_unit) for value in values))
+        text = f'{q.name.replace("_", " ")} {numbers} {system.unit(q.short_unit)}'
+        parts.append(text.rstrip().replace(' °', '°'))
+
     for name, values in study.vary.items():
-        sd = study.scatter.get(name)
-        around = f', each ± {sd.sd:g}' if isinstance(sd, Normal) else ''
-        parts.append(_with_unit(name, f'{values[0]:g} to {values[-1]:g}{around}'))
-    for name, law in study.scatter.items():
+        law = study.scatter.get(name)
         if isinstance(law, Normal):
-            if name not in study.vary:
-                parts.append(_with_unit(name, f'{_mean(study, name, law):g} ± {law.sd:g}'))
+            add(name, values[0], values[-1], law.sd, form='{:.4g} to {:.4g}, each ± {:.4g}')
         else:
-            parts.append(_with_unit(name, f'{law.low:g} to {law.high:g}'))
-    wind = [study.fixed(name) for name in WIND]
+            add(name, values[0], values[-1], form='{:.4g} to {:.4g}')
+    for name, law in study.scatter.items():
+        if not isinstance(law, Normal):
+            add(name, law.low, law.high, form='{:.4g} to {:.4g}')
+        elif name not in study.vary:
+            add(name, _mean(study, name, law), law.sd, form='{:.4g} ± {:.4g}')
+    wind = [system.number(study.fixed(name), 'm/s') + 0.0 for name in WIND]
     if any(wind):
-        parts.append('wind {:g} {:g} {:g} m/s'.format(*wind))
+        parts.append('wind {:.4g} {:.4g} {:.4g} '.format(*wind) + system.speed)
     if study.setup.wind.turbulence:
-        parts.append(f'gusts of {study.setup.wind.turbulence:g} m/s')
+        parts.append(f'gusts of {system.text(study.setup.wind.turbulence, "m/s", ".4g")}')
     return '; '.join(parts)
 
 
@@ -185,12 +193,6 @@ def _listed(matrix: FloatArray) -> list[list[float]]:
 
 def _value(name: str, value: float, system: System) -> str:
     return f'{name} {system.text(value, quantity("name", name).unit, ".6g")}'.rstrip()
-
-
-def _with_unit(name: str, values: str) -> str:
-    q = quantity('name', name)
-    unit = q.short_unit
-    return f'{q.name.replace("_", " ")} {values} {unit}'.rstrip().replace(' °', '°')
 
 
 def _mean(study: Study, name: str, law: Normal) -> float:
