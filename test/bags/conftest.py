@@ -1,16 +1,15 @@
 """What the tests of bags share: Foxglove's readers, from npm."""
 
 from collections.abc import Callable
-import fcntl
-import hashlib
 import json
 import os
 from pathlib import Path
 import shutil
 import subprocess
-import sys
 
 import pytest
+
+from made_once import made_once
 
 SOURCE = Path(__file__).with_name('js')
 COPIED = ('package.json', 'package-lock.json', 'read.mjs')
@@ -22,20 +21,18 @@ def foxglove() -> Callable[..., list[dict]]:
     node, npm = shutil.which('node'), shutil.which('npm')
     if node is None or npm is None:
         pytest.skip('node and npm are not installed: the readers of Foxglove cannot run')
+
+    def install(folder: Path) -> None:
+        for name in COPIED:
+            shutil.copy(SOURCE / name, folder)
+        command = [npm, 'ci', '--ignore-scripts', '--no-audit', '--no-fund']
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=240, check=False
+        )
+        assert done.returncode == 0, done.stderr
+
     content = b''.join((SOURCE / name).read_bytes() for name in COPIED)
-    folder = Path(sys.prefix) / 'cache' / f'foxglove_{hashlib.sha256(content).hexdigest()[:16]}'
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / 'lock').open('w') as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # two test runs may come at once
-        if not (folder / 'installed').exists():
-            for name in COPIED:
-                shutil.copy(SOURCE / name, folder)
-            command = [npm, 'ci', '--ignore-scripts', '--no-audit', '--no-fund']
-            done = subprocess.run(
-                command, cwd=folder, capture_output=True, text=True, timeout=240, check=False
-            )
-            assert done.returncode == 0, done.stderr
-            (folder / 'installed').touch()
+    folder = made_once('foxglove', content, install)
 
     def read(*paths: Path) -> list[dict]:
         done = subprocess.run(

@@ -6,13 +6,15 @@ from pathlib import Path
 import platform
 import re
 import sys
-import venv
 
+from packaging.utils import canonicalize_name
 import pytest
 
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch
+from made_once import made_once
+from package import linked
 from package.sources import ROOT
 from package.test_install import pip, run
 
@@ -29,21 +31,37 @@ OPTIONAL = ('numba', 'llvmlite', 'pyarrow', 'dask')
 
 @pytest.fixture(scope='module')
 def noble(tmp_path_factory, wheel) -> Path:
-    """Return an environment with exactly the versions of apt, and ROS."""
+    """Return an environment with exactly the versions of apt, and ROS.
+
+    The packages of apt are installed once; the others are those of this environment.
+    """
     pytest.importorskip('rclpy')
+
+    def install(folder: Path) -> None:
+        linked.make(folder)
+        run(*pip(folder), 'install', '--no-deps', '-r', CONSTRAINTS, cwd=folder)
+
+    content = CONSTRAINTS.read_bytes() + sys.version.encode()
+    apt = made_once('noble', content, install)
+    pinned = {canonicalize_name(line.partition('==')[0]) for line in pins()}
     folder = tmp_path_factory.mktemp('noble')
     prefix = folder / 'prefix'
-    venv.create(prefix, symlinks=True)
-    wanted = ('--no-compile', '-c', CONSTRAINTS, f'{wheel}[jazzy]')
+    linked.make(prefix)
+    linked.link(prefix, linked.requirements('jazzy') - pinned)
+    linked.link(prefix, pinned, apt)
+    wanted = ('--no-index', '-c', CONSTRAINTS, f'{wheel}[jazzy]')
     run(*pip(prefix), 'install', *wanted, cwd=folder)
     return prefix
 
 
+def pins() -> list[str]:
+    return [line for line in CONSTRAINTS.read_text().splitlines() if '==' in line]
+
+
 def test_the_versions_are_those_of_apt(noble, tmp_path):
     frozen = run(*pip(noble), 'freeze', cwd=tmp_path).splitlines()
-    pins = [line for line in CONSTRAINTS.read_text().splitlines() if '==' in line]
-    assert pins
-    assert set(pins) <= set(frozen)
+    assert pins()
+    assert set(pins()) <= set(frozen)
     assert not {line.partition('==')[0] for line in frozen} & set(OPTIONAL)
 
 
