@@ -1,5 +1,7 @@
 """`make docs` builds the documentation site without a warning, and the site needs no network."""
 
+from collections.abc import Iterator
+import fcntl
 from pathlib import Path
 import re
 import shutil
@@ -7,6 +9,8 @@ import subprocess
 import sys
 
 import pytest
+
+from made_once import made_once
 
 for package in ('sphinx', 'myst_parser', 'furo'):
     pytest.importorskip(package, reason='needs the extra [docs]: pip install -e .[docs]')
@@ -34,29 +38,60 @@ OUTSIDE = re.compile(
 )
 
 
-def build(source: Path, target: Path) -> subprocess.CompletedProcess[str]:
-    """Run Sphinx with the options of `make docs`."""
+def build(source: Path, target: Path, *more: object) -> subprocess.CompletedProcess[str]:
+    """Run Sphinx with the options of `make docs`, and more."""
     (options,) = re.findall(r'-m sphinx (.*) docs build/docs', (ROOT / 'Makefile').read_text())
     return subprocess.run(
-        [sys.executable, '-m', 'sphinx', *options.split(), source, target],
+        [sys.executable, '-m', 'sphinx', *options.split(), *map(str, more), source, target],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 
 @pytest.fixture(scope='module')
-def site(tmp_path_factory) -> Path:
-    """Return the folder of the site, built from a copy of docs/: Sphinx writes into its source."""
-    tree = tmp_path_factory.mktemp('site')
-    shutil.copytree(ROOT / 'docs', tree / 'docs', ignore=shutil.ignore_patterns('api'))
-    with (tree / 'docs/conf.py').open('a', encoding='utf-8') as conf:
-        conf.write(PLAIN)
+def site() -> Iterator[Path]:
+    """Return the folder of the site, built from a copy of docs/: Sphinx writes into its source.
+
+    The copy stays for the next run of the tests, in which Sphinx reads only what has changed since
+    then, and writes every page again: a link to a page that has gone fails. After a warning the
+    copy is removed, or the next run would not read the page that gave it.
+    """
+    settings = (ROOT / 'docs/conf.py', ROOT / 'requirements-dev.lock', Path(__file__))
+    content = b''.join(path.read_bytes() for path in settings)
+    tree = made_once('site', content, link_sources)
+    with (tree / 'lock').open('w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # two test runs may come at once
+        update(tree)
+        shutil.rmtree(tree / 'build', ignore_errors=True)
+        done = build(tree / 'docs', tree / 'build', '--write-all', '--doctree-dir', tree / 'read')
+        if done.returncode:
+            shutil.rmtree(tree)
+        assert done.returncode == 0, done.stderr
+        yield tree / 'build'
+
+
+def link_sources(tree: Path) -> None:
     for name in ('disc_sim_ros', 'config'):
         (tree / name).symlink_to(ROOT / name)
-    for name in ('CONTRIBUTING.md', 'CHANGELOG.rst'):  # links in them are relative to their folder
-        shutil.copy(ROOT / name, tree)
-    done = build(tree / 'docs', tree / 'build')
-    assert done.returncode == 0, done.stderr
-    return tree / 'build'
+
+
+def update(tree: Path) -> None:
+    """Copy docs/ and the pages beside it into a tree; what is the same keeps its time."""
+    names = ['CONTRIBUTING.md', 'CHANGELOG.rst']  # links in them are relative to their folder
+    names += [
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / 'docs').rglob('*')
+        if path.is_file() and not {'api', '__pycache__'} & set(path.relative_to(ROOT).parts)
+    ]
+    for path in (tree / 'docs').rglob('*'):
+        name = path.relative_to(tree).as_posix()
+        if path.is_file() and name not in names and not name.startswith('docs/api/'):
+            path.unlink()
+    for name in names:
+        text = (ROOT / name).read_bytes() + (PLAIN.encode() if name == 'docs/conf.py' else b'')
+        copy = tree / name
+        if not copy.is_file() or copy.read_bytes() != text:
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(text)
 
 
 @pytest.mark.slow
