@@ -5,7 +5,6 @@ from pathlib import Path
 import signal
 import struct
 import subprocess
-import sys
 import time
 
 import pytest
@@ -13,10 +12,10 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
 from disc_sim_ros.bags.reader import open_bag
+from ros.forked import start
 from ros.sim_process import DEADLINE, Harness
 
 RELIABLE = QoSProfile(depth=20_000)
-MAIN = 'import runpy\nrunpy.run_module("disc_sim_ros.ros.recorder")'
 COUNT = struct.Struct('<4xq')  # a serialised std_msgs/Int64
 
 
@@ -35,13 +34,13 @@ class Recorder:
         self.bag = bag
         self._ros = ros
         self._log = bag.with_name(f'{bag.name}.log')
-        program = f'import sys\n{before}\n{MAIN}'
-        command = [sys.executable, '-c', program, '--ros-args']
+        words = ['--ros-args']
         for name, value in {'bag': bag, **parameters}.items():
             text = str(value).lower() if isinstance(value, bool) else value
-            command += ['-p', f'{name}:={text}']
-        with self._log.open('wb') as log:
-            self.process = subprocess.Popen(command, stdout=log, stderr=log)
+            words += ['-p', f'{name}:={text}']
+        self.process = start(
+            'disc_sim_ros.ros.recorder', words, self._log, before and f'import sys\n{before}'
+        )
 
     @property
     def log(self) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 import signal
 import subprocess
-import sys
 import time
 from typing import Any
 
@@ -20,6 +19,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
+
+from ros.forked import start
 
 DEADLINE = 60.0  # s of wall time for what takes less than one on an idle machine
 ALL_QOS = QoSProfile(depth=100_000)  # reliable: a slow test loses nothing
@@ -42,14 +43,12 @@ class SimProcess:
         before: str = '',
     ) -> None:
         """Start it; `before` is Python code that its process runs first."""
-        program = f'{before}\nimport runpy\nrunpy.run_module("disc_sim_ros.ros.sim")'
-        command = [sys.executable, '-c', program, '--ros-args']
+        words = ['--ros-args']
         for key, value in parameters.items():
-            command += ['-p', f'{key}:={str(value).lower() if isinstance(value, bool) else value}']
+            words += ['-p', f'{key}:={str(value).lower() if isinstance(value, bool) else value}']
         self.name = name
         self._stderr = stderr
-        with stderr.open('wb') as file:
-            self.process = subprocess.Popen([*command, *arguments], stdout=file, stderr=file)
+        self.process = start('disc_sim_ros.ros.sim', [*words, *arguments], stderr, before)
 
     @property
     def stderr(self) -> str:

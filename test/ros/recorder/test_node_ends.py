@@ -19,7 +19,7 @@ from std_msgs.msg import Int64, String
 from disc_sim_ros import topics
 from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.bags.repair import repair
-from ros.recorder_process import MAIN, Counter, counts
+from ros.recorder_process import Counter, counts
 from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros
@@ -66,13 +66,14 @@ def test_files_split_by_duration_hold_everything_after_repeated_signals(ros, rec
 @pytest.mark.parametrize('number', [signal.SIGQUIT, signal.SIGHUP])
 def test_recorders_of_one_second_have_a_bag_each_and_close_it_at_a_signal(ros, tmp_path, number):
     same = 'import disc_sim_ros.ros.recorder.options as o; o.default_bag = lambda _: "bags/disc"'
+    run = 'import runpy\nrunpy.run_module("disc_sim_ros.ros.recorder")'
     logs = [tmp_path / 'a.log', tmp_path / 'b.log']
     processes = []
     for log in logs:
         with log.open('wb') as output:
             processes.append(
                 subprocess.Popen(
-                    [sys.executable, '-c', f'import sys\n{same}\n{MAIN}', '--ros-args'],
+                    [sys.executable, '-c', f'{same}\n{run}', '--ros-args'],
                     cwd=tmp_path, stdout=output, stderr=output,
                 )
             )  # fmt: skip
