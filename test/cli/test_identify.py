@@ -158,13 +158,15 @@ def test_a_throw_that_is_given_twice_is_refused(throw, tmp_path, capsys):
 
 
 def test_files_of_one_name_in_two_folders_are_two_throws(throw, tmp_path, capsys):
-    other = tmp_path / throw.name
+    one, other = tmp_path / 'a' / throw.name, tmp_path / 'b' / throw.name
     head, *rows = throw.read_text().splitlines()
-    other.write_text('\n'.join([head, *rows[:-3]]) + '\n')  # another one, a little shorter
-    words = [str(throw), str(other), '--disc', 'ultrastar', '--free', 'C_D0', '--spin', '60']
+    for file, count in ((one, 60), (other, 57)):  # the first second, and a little less
+        file.parent.mkdir()
+        file.write_text('\n'.join([head, *rows[:count]]) + '\n')
+    words = [str(one), str(other), '--disc', 'ultrastar', '--free', 'C_D0', '--spin', '60']
     assert identify.main([*words, '--starts', '1', '--json']) == 0
     names = json.loads(capsys.readouterr().out)['throws']
-    assert names == [f'{throw} one', f'{other} one']
+    assert names == [f'{one} one', f'{other} one']
 
 
 def test_each_throw_needs_a_row_of_the_releases(throw, tmp_path, capsys):

@@ -84,7 +84,10 @@ def test_same_recording_gives_the_same_bytes(csv, tmp_path, source):
 
     JSON has every number with all its digits, so that equal text is equal bits.
     """
-    file = {'csv': csv[0], 'bag': SAMPLE}[source]
+    file = SAMPLE
+    if source == 'csv':
+        file = tmp_path / 'throw.csv'
+        file.write_text('\n'.join(csv[0].read_text().splitlines()[:60]) + '\n')  # of 2 s
     written = []
     for seed in ('1', '2'):
         plot, page = (tmp_path / f'throw{seed}.{ending}' for ending in ('png', 'html'))

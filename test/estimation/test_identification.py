@@ -113,7 +113,7 @@ def test_a_throw_that_was_left_out_is_predicted(result):
 
 
 def test_the_same_seed_gives_the_same_answer():
-    throws = session(2, ('position',), values=base_of(BASE).values)
+    throws = session(1, ('position',), values=base_of(BASE).values)
     first, again = (identify(throws, BASE, free=['C_D0'], starts=1, seed=3) for _ in range(2))
     assert np.array_equal(again.x, first.x)
 
@@ -127,7 +127,7 @@ def test_a_coefficient_that_the_throws_do_not_tell_is_refused():
 def test_no_disc_gives_such_a_path():
     throw = session(1, ('position',))[0]
     (path,) = throw.observations
-    t = path.t
+    t = path.t[path.t < 1.2]  # s
     square = np.stack([15.0 * t, 8.0 * np.sign(np.sin(6.0 * t)), -2.0 - np.sin(9.0 * t)], axis=1)
     bent = throw_of('bent', [Positions(t, square)], BASE.disc)
     with pytest.raises(ConfigError, match=r'position.*no flight of a disc'):
