@@ -15,6 +15,7 @@ from rclpy.type_support import check_for_type_support
 from disc_sim_ros.ros.internals import Taken, WatchedSubscription
 from disc_sim_ros.ros.recorder.clock import LogClock
 from disc_sim_ros.ros.recorder.qos import same_request
+from disc_sim_ros.ros.recorder.sequences import Sequences
 from disc_sim_ros.ros.recorder.stall_watch import StallWatch
 from disc_sim_ros.ros.recorder.writer_thread import BagTopic
 
@@ -40,7 +41,7 @@ class TopicRecorder:
         received: Messages that arrived.
         dropped: Messages that arrived and were not recorded, because too many waited.
         lost: Messages that the middleware reported as lost.
-        missing: Gaps in the sequence numbers of the only publisher.
+        missing: Gaps in the sequence numbers of the publishers; with several it may be too small.
         before: Messages that the only publisher had sent before the subscription was matched.
         ended: Publishers that ended while this process stood still, or just after that.
         is_late: The topic was recorded before with another type: what its publisher sent until
@@ -87,7 +88,10 @@ class TopicRecorder:
         self._lateness = 0  # the longest since it was last reported [ns]
         self._described = 0  # publishers of the graph in the bag's description
         self._rematched = False  # since then a publisher came or left
-        self._next_number: int | None = None  # of the only publisher
+        self._sequences = Sequences()
+        # When a publisher last came or left [ns]: messages that were received before may be of one
+        # that left, and their numbers tell nothing.
+        self._matched_at = 0
         self._subscription: WatchedSubscription | None = None
         self._request: QoSProfile | None = None
         self._superseded: list[tuple[float, WatchedSubscription]] = []  # and when to destroy it
@@ -122,7 +126,7 @@ class TopicRecorder:
             self._overlap_until = end + OVERLAP
             self._recent = OrderedDict() if self._recent is None else self._recent
         self._request = request
-        self._next_number = None
+        self._sequences.forget()
         self._subscription = new
 
     def update(self) -> None:
@@ -207,7 +211,7 @@ class TopicRecorder:
             count += 1
             self._record(data, info, received)
         if self.missing > missing and self._match(subscription):
-            self.missing = missing  # numbers of several publishers prove no gap
+            self.missing = missing  # numbers of one that came or left prove no gap
         return taken is not None
 
     def _match(self, subscription: WatchedSubscription) -> bool:
@@ -218,8 +222,9 @@ class TopicRecorder:
         if count < self.publisher_count and self._stalls.is_recent():
             self.ended += self.publisher_count - count
         self._is_new = self._is_new or not count
+        self._matched_at = self._clock.now() if self.publisher_count else 0
         self.publisher_count = count
-        self._next_number = None
+        self._sequences.forget()
         self._rematched = True
         return True
 
@@ -232,22 +237,22 @@ class TopicRecorder:
             self._recent[key] = None
             if len(self._recent) > MOST_REMEMBERED:
                 self._recent.popitem(last=False)
-        self._count(info['publication_sequence_number'])
+        self._count(info['publication_sequence_number'], received)
         self._deliver(self, data, received, max(sent, 0))
 
-    def _count(self, number: int) -> None:
+    def _count(self, number: int, received: int) -> None:
         self.received += 1
-        if self.publisher_count == 1 and not self._superseded:
-            expected = self._next_number
-            if expected is None and self._is_new and not self.latched:
-                if self.is_late:
-                    expected = 1  # of the first message of a publisher
-                else:
-                    self.before += number - 1
-            self._is_new = False
-            if expected is not None and number > expected:
-                self.missing += number - expected
-            self._next_number = number + 1
+        if self._superseded or not self.publisher_count:
+            return
+        is_new, self._is_new = self._is_new, False
+        if is_new and self.publisher_count == 1 and not self.latched:
+            if self.is_late:
+                self.missing += number - 1
+            else:
+                self.before += number - 1
+        elif received <= self._matched_at:
+            return
+        self.missing += self._sequences.gap(number, self.publisher_count)
 
 
 def message_type(name: str) -> Any:

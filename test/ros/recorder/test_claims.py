@@ -96,12 +96,38 @@ def test_a_publisher_that_comes_again_is_told_of_as_well(ros, record):
     second.publish(30)
     second.wait_for_subscriptions(1)
     second.publish(10)
+    # The recorder may learn of the publisher later than that of the recorder.
+    ros.spin_until(lambda: counts(recorder.bag, '/count')[-1] == 39, 'the last message')
     assert recorder.end() == 0
     recorded = counts(recorder.bag, '/count')[10:]
     before = 40 - len(recorded)
     assert recorded == list(range(before, 40))
     numbers = [int(n) for n in re.findall(r'/count (\d+)', last_line(recorder))]
     assert numbers == [before] * (before > 0)
+
+
+def test_numbers_of_a_publisher_that_left_are_not_taken_for_a_gap(ros, record):
+    """Its last messages wait beside those of another one while the recorder is stopped."""
+    recorder = record()
+    both = [Counter(ros, 'count') for _ in range(2)]
+    recorder.wait_for_topics('/count')
+    for counter, count in zip(both, (1000, 10), strict=True):
+        counter.wait_for_subscriptions(1)
+        counter.publish(count)
+    ros.spin_until(lambda: len(counts(recorder.bag, '/count')) == 1010, 'all of both')
+    recorder.process.send_signal(signal.SIGSTOP)
+    for _ in range(20):
+        for counter in both:
+            counter.publish_one()
+    time.sleep(0.2)
+    ros.node.destroy_publisher(both[0]._publisher)
+    recorder.process.send_signal(signal.SIGCONT)
+    recorder.wait_for_log('ended')
+    both[1].publish(10)
+    assert recorder.end() == 0
+    recorded = counts(recorder.bag, '/count')
+    gaps = int(open_bag(recorder.bag).custom_data.get('gaps /count', 0))
+    assert gaps <= 1060 - len(recorded)
 
 
 def test_a_recorder_without_topics_does_not_claim_that_nothing_was_lost(record):
