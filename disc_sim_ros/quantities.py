@@ -433,6 +433,10 @@ PREDICTION = _table(
     ),
     Quantity('throw_spin_sigma', 'rad/s', 0.1, 1000.0, 15.0, 'Its standard deviation'),
     Quantity(
+        'opposite_spin', '', 0.0, 0.5, 0.02,
+        'Probability of a throw that spins the other way round; 0: it is not tried',
+    ),
+    Quantity(
         'wind_sigma', 'm/s', 0.0, 50.0, 2.0,
         'Standard deviation of the wind along x and y; 0: it is known',
     ),

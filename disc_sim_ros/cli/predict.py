@@ -202,7 +202,8 @@ def _assumed(chosen: argparse.Namespace, config: 'PredictorConfig', system: Syst
     sigma = system.text(chosen.throw_spin_sigma, 'rad/s', '.0f')
     return (
         f'assumed: {" or ".join(config.discs)} (--disc), '
-        f'spin of {spin} +- {sigma} (--throw-spin), {config.opposite_spin:.0%} the other way round'
+        f'spin of {spin} +- {sigma} (--throw-spin), '
+        f'{config.opposite_spin:.0%} the other way round (--opposite-spin)'
     )
 
 

@@ -30,6 +30,7 @@ def predictor_config(setups: Sequence[Setup], values: Mapping[str, float]) -> Pr
         setup=first[0],
         prior=first[1],
         others=tuple(others),
+        opposite_spin=values['opposite_spin'],
         position_sigma=values['position_sigma'],
         attitude_sigma=math.radians(values['attitude_sigma']),
         ground_height=values['ground_height'],

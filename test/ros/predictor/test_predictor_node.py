@@ -70,11 +70,18 @@ def pose(t: float, position, axis=None) -> PoseStamped:
         ('discs', 'ultrastar frisby', 'frisbee'),
         ('intercept_plane_point', (1.0, 0.0, 0.0), 'intercept_plane_normal'),
         ('intercept_plane_normal', (math.nan, 0.0, 1.0), 'intercept_plane_normal'),
+        ('opposite_spin', 0.6, '0.5'),
     ],
 )
 def test_bad_parameters_are_refused(name, value, allowed):
     with pytest.raises(ConfigError, match=allowed):
         node_config({name: value})
+
+
+def test_opposite_spin_of_probability_0_is_not_tried():
+    of_share = [node_config({'opposite_spin': x}).predictor for x in (0.0, 0.3)]
+    assert [len(c.models_of_opposite_spin) for c in of_share] == [0, 1]
+    assert of_share[1].opposite_spin == 0.3
 
 
 def test_measurement_is_turned_into_map():
