@@ -14,7 +14,7 @@ from disc_sim_ros.errors import ConfigError, IntegrationError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.physics.disc import AERODYNAMICS, GROUND_CONTACTS, Disc
 from disc_sim_ros.physics.environment import Air, Wind
-from disc_sim_ros.physics.kernels import adaptive, integrator, rotation
+from disc_sim_ros.physics.kernels import adaptive, integrator, rotation, stages
 from disc_sim_ros.physics.kernels.aerodynamics import Linear
 from disc_sim_ros.physics.kernels.equations import (
     BODY,
@@ -310,7 +310,7 @@ class _OfThread(threading.local):
     """Memory that compiled code works in; each thread has its own."""
 
     def __init__(self) -> None:
-        self.space = np.empty(adaptive.SPACE)
+        self.space = np.empty(stages.SPACE)
 
 
 _of_thread = _OfThread()

@@ -8,11 +8,14 @@ import pytest
 
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.ensemble import fly_many
-from disc_sim_ros.physics.environment import Wind
+from disc_sim_ros.physics.environment import Air, Wind
 from disc_sim_ros.physics.flight import MODELS, Setup, fly
-from disc_sim_ros.physics.kernels.aerodynamics import table_coefficients
-from disc_sim_ros.physics.kernels.equations import Control
+from disc_sim_ros.physics.kernels import dopri5
+from disc_sim_ros.physics.kernels.aerodynamics import row_of, table_coefficients
+from disc_sim_ros.physics.kernels.dopri5 import with_table
+from disc_sim_ros.physics.kernels.equations import Control, Velocity
 from disc_sim_ros.physics.kernels.jit import COMPILED
+from disc_sim_ros.physics.kernels.stages import SPACE
 from disc_sim_ros.physics.launch import Launch
 
 PROMISED = 1e-5  # m
@@ -61,6 +64,47 @@ def test_a_landing_is_that_of_fine_steps(name):
         assert landed.landed == fine.landed
         assert math.dist(landed.position, fine.position) < PROMISED, (number, launch, setup)
         assert landed.apex == pytest.approx(fine.apex, abs=5e-5)  # on a cubic within a step
+
+
+@pytest.mark.parametrize(
+    ('name', 'number'),
+    [
+        ('frisbee_roll_moment', 25),  # the advance ratio passes rows of the spin table
+        ('frisbee_roll_moment', 196),
+        ('firebird', 240),  # released at a corner of the table, and leaves it at once
+        ('wraith', 22),  # 9 s
+        ('ultrastar', 244),
+        ('teebird', 265),  # nutates slowly, for 7 s
+        ('frisbee', 164),
+    ],
+)
+def test_the_worst_of_a_few_thousand_keep_the_promise(name, number):
+    launch, setup, control = drawn(name, number)
+    fine = fly(launch, replace(setup, step=2e-5), control=control)
+    assert math.dist(fly(launch, setup, control=control).position, fine.position) < PROMISED
+
+
+@pytest.mark.parametrize('wh', [0.3, 1.0, 2.0, 5.0])
+def test_a_step_of_any_length_follows_the_nutation_of_a_free_disc(wh):
+    disc = disc_file.load_disc('frisbee')
+    setup = Setup(disc=disc, air=Air(density=0.0))
+    s = Launch(height=50.0, spin=30.0, roll_rate=0.02, pitch_rate=0.01).state()
+    h = wh / (30.0 * setup.plant.I_z / setup.plant.I_x)
+    row = row_of(setup.corner_plant.table, 0)
+    plant, calm = with_table(setup.corner_plant, row), Velocity(0.0, 0.0, 0.0)
+    K = np.zeros(SPACE)
+    dopri5.start(s, calm, plant, setup.calm_inputs, K)
+    end = dopri5.step(s, h, calm, calm, plant, setup.calm_inputs, K)
+    fine = fly(
+        Launch(height=50.0, spin=30.0, roll_rate=0.02, pitch_rate=0.01),
+        replace(setup, step=h / 500),
+        duration=h,
+    ).end
+    # The motion that is taken out is that of small angles, to the square of the tilt.
+    tilt = math.hypot(0.02, 0.01) * h / wh
+    assert end.p == pytest.approx(fine.p, abs=1e-10)
+    assert end.q == pytest.approx(fine.q, abs=1e-10)
+    assert end[6:10] == pytest.approx(fine[6:10], abs=tilt**2)
 
 
 @pytest.mark.parametrize(

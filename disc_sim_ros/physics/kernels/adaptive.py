@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.physics.kernels import dopri5
+from disc_sim_ros.physics.kernels import corners, dopri5
 from disc_sim_ros.physics.kernels.aerodynamics import Row, row_of, search
-from disc_sim_ros.physics.kernels.dopri5 import STAGES, with_table
+from disc_sim_ros.physics.kernels.dopri5 import with_table
 from disc_sim_ros.physics.kernels.equations import Plant, State, Velocity, flow
 from disc_sim_ros.physics.kernels.integrator import (
     FLYING,
@@ -25,6 +25,7 @@ from disc_sim_ros.physics.kernels.integrator import (
     write_sample,
 )
 from disc_sim_ros.physics.kernels.jit import entry, inline, jit
+from disc_sim_ros.physics.kernels.nutation import remember
 from disc_sim_ros.physics.kernels.rk4 import (
     Inputs,
     cubic,
@@ -36,7 +37,6 @@ from disc_sim_ros.physics.kernels.rk4 import (
     touches,
 )
 from disc_sim_ros.physics.kernels.simd import where
-from disc_sim_ros.physics.kernels.state_arrays import STATE_SIZE
 from disc_sim_ros.physics.kernels.wind import (
     GUST_INTERVAL,
     gust_of,
@@ -52,7 +52,6 @@ LONGEST_IN_SPIN_TABLE = (
 )
 SHORTEST = 1e-6  # s; taken whatever the error, as at a corner that is not searched for
 SOUND = 1e-4  # s; a disc that turns too fast for RK4 steps of this length is lost
-SPACE = STATE_SIZE * STAGES  # numbers that the rates of change of one flight take
 _SAFETY = 0.9
 _LEAST = 0.2  # factors of the length from step to step
 _MOST = 5.0
@@ -123,19 +122,26 @@ def judge(
     cut = where(ends_early, 0.0, p.cut)
     at_corner = abs(cut) > 0.0
 
-    f, side, alpha = dopri5.first_exit(
+    f, side, alpha = corners.first_exit(
         s, end, h, gust, next_gust, inputs, low_end, high_end, K, p.alpha
     )
     to_corner = max(f * h, SHORTEST)
     exits = good & (abs(side) > 0.0) & (abs(cut) <= 0.0) & (to_corner < h)
     accepted = good & ((abs(side) <= 0.0) | at_corner | (to_corner >= h))
+    to_ratio = h
+    if len(plant.spin_terms) > 0:
+        to_ratio = h * corners.ratio_exit(s, end, h, gust, next_gust, plant, inputs, K)
+    # No row over the advance ratio holds for a whole step: to end near its corner is enough.
+    stays = (to_ratio <= SHORTEST) | (to_ratio >= h - SHORTEST) | (to_ratio >= f * h)
+    passes = good & (to_ratio > SHORTEST) & (to_ratio < h - SHORTEST) & (to_ratio < f * h)
+    exits, accepted = exits & stays, accepted & stays
     # A step that leaves the row without a shorter one before it ends at the corner itself.
     turned = where(at_corner, cut, side)
 
     next_h = where(
         ends_early, max(proposed, p.h), where(at_corner, max(proposed, p.after_cut), proposed)
     )
-    next_h = where(accepted, next_h, where(exits, to_corner, proposed))
+    next_h = where(accepted, next_h, where(exits, to_corner, where(passes, to_ratio, proposed)))
     return Trial(
         accepted,
         Progress(
@@ -185,7 +191,7 @@ def integrate_adaptive(
         inputs: Control inputs, held for the whole flight, wind and gust noise.
         options: Duration, ground and sample rate; the step is not used.
         samples: As for `integrator.integrate`.
-        K: Work space for the rates of change, shape (98,).
+        K: Work space, see `stages`.
     """
     x = initialise(s, plant, inputs)
     if len(samples) > 0:
@@ -208,7 +214,7 @@ def continue_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
 ) -> IntegrationResult:
     """Integrate a flight from `x` and `p`, with the apex so far, to its end.
 
-    Stage 0 of `K` holds the rate of change of `x`.
+    `K` begins with the rate of change of `x`, see `stages.carry`.
     """
     duration, wind, noise = options.duration, inputs.wind, inputs.noise
     written = min(len(samples), 1)
@@ -265,7 +271,7 @@ def continue_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
         if s.VZ < 0.0 <= next_s.VZ:
             apex_Z = min(apex_Z, top(s, next_s, h))
         apex_Z = min(apex_Z, next_s.Z)
-        dopri5.put(K, 0, dopri5.rate(K, STAGES - 1))
+        remember(s, next_s, h, True, plant, K)  # noqa: FBT003
         s, gust = next_s, next_gust
         p = trial.progress
         if landed:

@@ -9,7 +9,6 @@ from disc_sim_ros.physics.kernels import dopri5
 from disc_sim_ros.physics.kernels.adaptive import (
     CLOSE,
     SOUND,
-    SPACE,
     Progress,
     comes_down,
     continue_adaptive,
@@ -28,13 +27,15 @@ from disc_sim_ros.physics.kernels.batch import (
     workspace,
     write_end,
 )
-from disc_sim_ros.physics.kernels.dopri5 import STAGES, with_table
+from disc_sim_ros.physics.kernels.dopri5 import with_table
 from disc_sim_ros.physics.kernels.equations import Plant
 from disc_sim_ros.physics.kernels.integrator import Options, initialise
 from disc_sim_ros.physics.kernels.jit import entry, inline
+from disc_sim_ros.physics.kernels.nutation import remember
 from disc_sim_ros.physics.kernels.rk4 import Inputs, is_sound, top
 from disc_sim_ros.physics.kernels.rows import fill_table, inputs_of, plant_of, release
 from disc_sim_ros.physics.kernels.simd import WIDTH, any_of, element, store, where
+from disc_sim_ros.physics.kernels.stages import SPACE, carry
 from disc_sim_ros.physics.kernels.state_arrays import load_state, select, store_state
 
 
@@ -103,7 +104,7 @@ def fly_simd_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
                 fill_table(rows[i], plant.table, table)
                 own_plant, own_inputs = plant_of(rows[i], plant, table), inputs_of(rows[i], inputs)
                 x, apex_Z = flight_in(a, lane), a.apex_Z[0, lane]
-                dopri5.put(K, 0, dopri5.rate(lanes_K[:, lane], 0))
+                carry(lanes_K[:, lane], K)
                 result = continue_adaptive(
                     x, _progress(space, lane), apex_Z, own_plant, own_inputs, options,
                     no_samples, K,
@@ -120,7 +121,7 @@ def fly_simd_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
                 own_plant = with_table(own_plant, row_of(table, p.row))
                 dopri5.start(x.state, NO_GUST, own_plant, own_inputs, K)
                 fill_lane(a, lane, started, row, table, x.state)
-                dopri5.put(lanes_K[:, lane], 0, dopri5.rate(K, 0))
+                carry(K, lanes_K[:, lane])
                 for j in range(len(p)):
                     space.progress[j, lane] = p[j]
                 started += 1
@@ -158,10 +159,8 @@ def fly_simd_adaptive(  # noqa: PLR0915 - one loop, whose parts share all of its
         if any_of(over_the_top):
             apex_Zs = where(over_the_top, min(apex_Zs, top(s, next_s, p.h)), apex_Zs)
         store(a.apex_Z, 0, where(accepted, min(apex_Zs, next_s.Z), apex_Zs))
-        next_s = select(accepted, next_s, s)
-        store_state(a.state, 0, next_s)
-        last = dopri5.rate(lanes_K, STAGES - 1)
-        dopri5.put(lanes_K, 0, select(accepted, last, dopri5.rate(lanes_K, 0)))
+        remember(s, next_s, p.h, accepted, plants, lanes_K)
+        store_state(a.state, 0, select(accepted, next_s, s))
         for j in range(len(next_p)):
             store(space.progress, j, where(alone > 0.0, p[j], next_p[j]))
 
