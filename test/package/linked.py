@@ -1,7 +1,8 @@
 """Environments for one installation: symlinks to packages that another environment has."""
 
-from collections.abc import Collection, Iterable
-from importlib.metadata import Distribution, distribution, distributions
+from collections.abc import Collection
+import functools
+from importlib.metadata import distribution, distributions
 import os
 from pathlib import Path
 import sys
@@ -51,40 +52,42 @@ def link(prefix: Path, names: Collection[str], source: Path = Path(sys.prefix)) 
     Raises:
         LookupError: The source has not all of the packages.
     """
-    site = site_packages(source)
-    present, linked, others = set(), set(), set()
-    for one in distributions(path=[str(site)]):
-        name = canonicalize_name(one.name)
-        paths = files(one, site, source)
-        if name in names:
-            present.add(name)
-            linked.update(paths)
-        else:
-            others.update(paths)
-    if missing := set(names) - present:
+    owned = paths_of(source)
+    if missing := set(names) - set(owned):
         raise LookupError(f'{source} has no {sorted(missing)}')
-    shared = {folder for path in others for folder in path.parents}
-    shared.update(
-        folder for path in linked for folder in path.parents if (prefix / folder).is_dir()
-    )
+    linked, others = set(), set()
+    for name, paths in owned.items():
+        (linked if name in names else others).update(paths)
+    shared = folders_of(others)
+    shared.update(folder for folder in folders_of(linked) if (prefix / folder).is_dir())
     for path in {highest(path, shared) for path in linked}:
         (prefix / path).parent.mkdir(parents=True, exist_ok=True)
         (prefix / path).symlink_to(source / path)
 
 
-def site_packages(prefix: Path) -> Path:
-    """Return the folder of an environment from which Python imports."""
-    return next((prefix / 'lib').glob('python3*/site-packages'))
+@functools.cache
+def paths_of(prefix: Path) -> dict[str, set[Path]]:
+    """Return the files of each package in an environment, except programs, by canonical name."""
+    (site,) = (prefix / 'lib').glob('python3*/site-packages')
+    inside = site.relative_to(prefix)
+    owned: dict[str, set[Path]] = {}
+    for one in distributions(path=[str(site)]):
+        paths = owned.setdefault(canonicalize_name(one.name), set())
+        for path in one.files or ():
+            top, *rest = os.path.normpath(inside / path).split('/')
+            if top != 'bin':
+                paths.add(Path('lib' if top == 'lib64' else top, *rest))  # lib64 is a link to lib
+    return owned
 
 
-def files(one: Distribution, site: Path, prefix: Path) -> Iterable[Path]:
-    """Yield the paths of an installed package in its environment, except programs."""
-    for path in one.files or ():
-        top, *rest = Path(os.path.normpath(site / path)).relative_to(prefix).parts
-        if top != 'bin':
-            yield Path('lib' if top == 'lib64' else top, *rest)  # lib64 is a link to lib
+def folders_of(paths: Collection[Path]) -> set[Path]:
+    """Return all folders on the way to some paths."""
+    parents = {path.parent for path in paths}
+    return parents | {folder for parent in parents for folder in parent.parents}
 
 
 def highest(path: Path, shared: Collection[Path]) -> Path:
     """Return the outermost folder of a path that is not shared, or the path itself."""
-    return next((folder for folder in reversed(path.parents) if folder not in shared), path)
+    if path.parent in shared:
+        return path
+    return next(folder for folder in reversed(path.parents) if folder not in shared)
