@@ -5,16 +5,19 @@ Usage: python benchmarks/sweep.py [--longest SECONDS] [--short] [COUNT ...]
 Each count is one run of the program: a Monte Carlo study of the Fig. 5 throw with six scattered
 quantities, into a Parquet file, with its summary. The system reports its time and memory. With
 --short each flight is one step of 20 ms: the cost of sampling, writing, joining and statistics.
+With --parts one run in this process, with one worker, tells the CPU time of each part.
 `make bench` compares one worker with two.
 """
 
 import argparse
+from contextlib import redirect_stdout
 import os
 from pathlib import Path
 import subprocess
 import sys
 import tempfile
 import time
+from typing import Any
 
 from lines import Line, number
 
@@ -68,6 +71,38 @@ def measure(
     return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * _unit(), size
 
 
+def measure_parts(count: int) -> None:
+    """Print the CPU time of the parts of one sweep, each of its own thread [s]."""
+    start = time.process_time()
+    from disc_sim_ros.cli import sweep as program  # noqa: PLC0415 - the import is measured
+    from disc_sim_ros.studies import runner, storage, summary  # noqa: PLC0415
+
+    seconds: dict[str, float] = {}
+
+    def timed(place: Any, name: str) -> None:
+        function = getattr(place, name)
+
+        def measured(*arguments: Any, **named: Any) -> Any:
+            before = time.thread_time()
+            try:
+                return function(*arguments, **named)
+            finally:
+                seconds[name] = seconds.get(name, 0.0) + time.thread_time() - before
+
+        setattr(place, name, measured)
+
+    timed(runner, 'fly_batch')
+    timed(storage.Parts, 'keep')
+    timed(storage.Parts, 'join')
+    timed(summary, 'summarise')
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(None):
+        file = str(Path(folder, 'a.parquet'))
+        words = ['--count', str(count), '--step', '0.02', '--output', file, '--workers', '1']
+        program.main([*words, *(word for text in SCATTER for word in ('--scatter', text))])
+    text = ', '.join(f'{name} {value:.2f} s' for name, value in seconds.items())
+    print(f'{count} flights: {text}; all {time.process_time() - start:.2f} s')
+
+
 def _unit() -> int:
     return 1 if sys.platform == 'darwin' else 1024
 
@@ -78,7 +113,11 @@ def main() -> None:
     parser.add_argument('counts', metavar='COUNT', nargs='*', type=int)
     parser.add_argument('--longest', type=float, default=360.0, help='stop before a longer run')
     parser.add_argument('--short', action='store_true', help='flights of one step')
+    parser.add_argument('--parts', action='store_true', help='the CPU time of each part')
     chosen = parser.parse_args()
+    if chosen.parts:
+        measure_parts(chosen.counts[0] if chosen.counts else COUNT)
+        return
     cores = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
     print(f'{cores} cores, load {os.getloadavg()[0]:.1f}', flush=True)
     print('    flights   wall s    CPU s  flights/s  flights/CPU-s  peak MiB  file MB', flush=True)

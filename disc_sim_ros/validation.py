@@ -145,6 +145,10 @@ def number(
     def refused() -> ConfigError:
         return ConfigError(thing, value, range_text(lowest, highest, above, unit), quantity)
 
+    if type(value) is float and above is None and lowest <= value <= highest:
+        if math.isfinite(value):  # the usual case, without what takes most of the time
+            return value
+        raise refused()
     if isinstance(value, bool) or not isinstance(value, int | Real):
         raise refused()
     try:

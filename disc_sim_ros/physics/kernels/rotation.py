@@ -74,6 +74,8 @@ def cos_sin_degrees(angle: float) -> tuple[float, float]:
     The sine of the opposite angle is the exact opposite, so that mirrored launches give mirrored
     flights.
     """
+    if angle == 0.0:
+        return 1.0, angle
     quarter, rest = divmod(abs(angle), 90.0)
     c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
     c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
