@@ -24,13 +24,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Give the tests of real nodes to two workers, and run them first.
 
     They mostly wait, but more than two at a time would disturb each other on two cores. Next are
-    the modules that a group keeps on one worker, to share a fixture; then all other tests.
+    the modules that a group keeps on one worker, to share a fixture, also if they run real nodes;
+    then all other tests.
     """
     for item in items:
-        if is_ros(item):
+        if is_ros(item) and not group_of(item):
             half = 1 if f'{item.path.parent.name}/{item.path.stem}' in FIRST else 2
             item.add_marker(pytest.mark.xdist_group(f'ros {half}'))
-    items.sort(key=lambda item: (not is_ros(item), not item.get_closest_marker('xdist_group')))
+    items.sort(key=lambda item: (not group_of(item).startswith('ros '), not group_of(item)))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -41,9 +42,15 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """
     gc.collect()
     gc.freeze()
-    grouped = [item for item in session.items if item.get_closest_marker('xdist_group')]
+    grouped = [item for item in session.items if group_of(item)]
     if getattr(session.config.option, 'loadgroup', False) and grouped:
         assert '@' in grouped[0].nodeid, 'this pytest and this pytest-xdist keep no groups'
+
+
+def group_of(item: pytest.Item) -> str:
+    """Return the group that keeps a test on one worker, or ''."""
+    mark = item.get_closest_marker('xdist_group')
+    return str(mark.args[0]) if mark else ''
 
 
 def is_ros(item: pytest.Item) -> bool:
