@@ -57,8 +57,10 @@ _E = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525,
 # momentum, about which the disc nutates, turns the lift until the landing.
 _TIME = 4.0  # s
 _LEVER = 100.0  # m per rad
-# An error of the nutation turns the lift to and fro, the less the faster it is.
+# An error of the nutation turns the lift to and fro, the less the faster it is; and it lifts the
+# rim that touches the ground, so that a disc that comes in flat lands earlier or later.
 _NUTATION_LEVER = 2000.0  # m/s per rad, over its rate
+_FLATTEST = 50.0  # metres forward for each metre down
 _SLOWEST_SPIN = 10.0  # rad/s; the precession of a slower disc follows its spin no more closely
 
 
@@ -140,12 +142,13 @@ def error_rate(s: State, plant: Plant, K: FloatArray) -> float:
     turn_y = 2.0 * (s.e0 * e.e2 - s.e2 * e.e0 + s.e1 * e.e3 - s.e3 * e.e1)
     x, y = e.p / nutation, e.q / nutation
     axis = (turn_y + x) * (turn_y + x) + (turn_x - y) * (turn_x - y) + e.r * e.r / (spin * spin)
-    cone = (x * x + y * y) / (nutation * nutation)
+    cone = x * x + y * y
+    lever, touch = _NUTATION_LEVER / nutation, _FLATTEST * plant.rim
     return math.sqrt(
         position
         + _TIME * _TIME * velocity
         + _LEVER * _LEVER * axis
-        + _NUTATION_LEVER * _NUTATION_LEVER * cone
+        + (lever * lever + touch * touch) * cone
     )
 
 
