@@ -4,49 +4,40 @@ Every figure is measured in this run with real processes: the node, one that sub
 and `pose`, one that sends commands. CPU is that of the node's process, per cent of one core. The
 naive node runs the same physics in an rclpy timer, builds new messages, and takes commands in
 callbacks of the executor. The C++ program, benchmarks/rcl_loop.cpp, calls rcl itself; it is built
-and measured where g++ is.
+and measured where g++ is. Lateness is how long after its deadline a thread wakes up: the median of
+the quantiles of some 1,000 deadlines each.
 
 usage: benchmarks/node.py [seconds of each measurement]
 """
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
+import math
 import os
 from pathlib import Path
-import select
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 import rclpy
-from rclpy.node import Node
 
 from disc_sim_ros.physics.simulator import warm_up
 from disc_sim_ros.ros import processes
 from lines import Line, print_lines
-from node_roles import DEEP, HIGH, TYPES
+from node_processes import Watch, role, simulator, started, wait_for_line
+from node_roles import DEEP, TYPES
 
 TICK = os.sysconf('SC_CLK_TCK')
 MOST_CPP = 1.3  # times the C++ program, with odom, pose and commands at 1 kHz
 MOST_IDLE = 5.0  # per cent of a core, at 200 Hz without subscribers
 MOST_LATE = 2.0  # times the p99 of the bare thread
+WINDOW = 1000  # deadlines, as in the diagnostics of sim_node
 MOST_STEPS = 3  # two steps and one period, from a command to its effect
 MOST_START, MOST_COLD_START = 1.5, 15.0  # s
 KEPT_UP = 0.999  # of real time, and of the messages
-SIM_NODE = (sys.executable, '-m', 'disc_sim_ros.ros.sim')
-PYTHON_LOOP = """
-import runpy
-from disc_sim_ros.ros.sim import loop
-loop.compiled_loop = lambda *_: None
-runpy.run_module('disc_sim_ros.ros.sim', run_name='__main__')
-"""
-DEADLINE = 60.0  # s, for a process to be ready
 
 
 def main() -> None:
@@ -82,10 +73,12 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
         for kind in ('naive', 'Python loop')
     )
     fast = measured('sim_node 10 kHz, odom + pose 10 kHz', 10000, 10000, both, 0, seconds)
-    cpp = fast_cpp = None
+    cpp = beside = fast_cpp = None
     if shutil.which('g++'):
         line = 'C++ on rcl, odom + pose + commands 1 kHz'
         cpp = measured(line, 1000, 1000, both, 1000, seconds, kind='C++')
+        line = 'the same, with a sleeping thread beside it'
+        beside = measured(line, 1000, 1000, both, 1000, seconds, kind='C++ and thread')
         line = 'C++ on rcl, odom + pose 10 kHz'
         fast_cpp = measured(line, 10000, 10000, both, 0, seconds, kind='C++')
     every, python_every = (
@@ -98,7 +91,8 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
         for topic in [name for name in TYPES if name not in both]:
             cost = measured(topic, 1000, 1000, [topic], 0, seconds / 2, show=False)[0] - plain[0]
             print(f'  {topic:14s} {cost:5.1f}')
-    steps = [command_to_effect() for _ in range(5)]
+    steps = [command_to_effect() for _ in range(10)]
+    print('messages from a command to its effect:', *sorted(steps))
     warm = min(start_time() for _ in range(3))
     with tempfile.TemporaryDirectory() as empty:
         cold = start_time(XDG_CACHE_HOME=empty)
@@ -154,6 +148,15 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
             kept=late <= MOST_LATE,
         ),
         Line(
+            what='the same, lateness p99',
+            ours=f'{full[3] * 1e6:.0f} us',
+            beside='C++ on rcl: no g++, not measured'
+            if cpp is None or beside is None
+            else f'C++ on rcl {cpp[3] * 1e6:.0f} us; a sleeping thread beside it '
+            f'{beside[3] * 1e6:.0f} us',
+            ratio=None if cpp is None else full[3] / cpp[3],
+        ),
+        Line(
             what='physics, `odom` and `pose` at 10 kHz',
             ours=f'{fast[1]:,.0f} messages a second, {fast[0]:.0f} % of a core',
             beside='real time' if fast_cpp is None else f'C++ on rcl {fast_cpp[0]:.0f} %',
@@ -162,7 +165,7 @@ def _lines(seconds: float, *, topics_too: bool) -> tuple[Line, ...]:
             kept=fast[2] >= KEPT_UP and fast[1] >= KEPT_UP * 10_000,
         ),
         Line(
-            what='command to published effect, 1 kHz, 5 times',
+            what=f'command to published effect, 1 kHz, {len(steps)} times',
             ours=f'at most {max(steps)} messages later',
             bound=f'at most {MOST_STEPS}',
             kept=max(steps) <= MOST_STEPS,
@@ -223,13 +226,20 @@ def tried(
     """
     with ExitStack() as stack:
         node = stack.enter_context(simulator(physics, publish, kind, **environment))
+        sleeper = None
+        if kind == 'C++ and thread':
+            sleeper = stack.enter_context(role('sleep', str(physics)))
+        elif kind == 'C++':
+            sleeper = node
         subscriber = None
         if subscribed:
             subscriber = stack.enter_context(role('subscribe', *subscribed))
         if command_rate:
             stack.enter_context(role('command', str(command_rate)))
         watch = stack.enter_context(Watch.running())
-        if kind not in {'naive', 'C++'}:
+        if kind == 'naive' or sleeper is not None:
+            pass  # no diagnostics
+        else:
             watch.wait()
         if subscriber is not None:
             wait_for_line(subscriber)
@@ -242,93 +252,11 @@ def tried(
         if subscriber is not None:
             subscriber.send_signal(signal.SIGINT)
             rate = float(subscriber.communicate()[0].split()[-1])
+        if sleeper is not None:
+            sleeper.send_signal(signal.SIGINT)
+            late = [float(line) for line in sleeper.communicate()[0].split()]
+            return used, rate, 0.0, *quantiles(late)
     return used, rate, *watch.medians()
-
-
-@contextmanager
-def simulator(
-    physics: int, publish: int, kind: str, **environment: str
-) -> Iterator[subprocess.Popen]:
-    """Run a node in a process of its own: 'sim_node', its 'Python loop', 'naive' or 'C++'."""
-    if kind == 'naive':
-        with role('naive', str(physics)) as process:
-            yield process
-    elif kind == 'C++':
-        with ExitStack() as stack:
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            yield stack.enter_context(role('rcl', str(build_rcl_loop(folder)), str(physics)))
-    else:
-        python_loop = kind == 'Python loop'
-        with started(physics, publish, python_loop=python_loop, **environment) as process:
-            yield process
-
-
-def build_rcl_loop(folder: Path) -> Path:
-    """Build benchmarks/rcl_loop.cpp with the headers of the ROS that rclpy belongs to."""
-    maps = Path('/proc/self/maps').read_text(encoding='utf-8').splitlines()
-    root = next(Path(line.split()[-1]) for line in maps if line.endswith('/librcl.so')).parents[1]
-    library = folder / 'librcl_loop.so'
-    command = ['g++', '-O2', '-std=c++17', '-shared', '-fPIC', '-Wall', '-Wextra']
-    for path in (root / 'include').iterdir():
-        command += ['-isystem', str(path)]
-    command += [str(Path(__file__).with_name('rcl_loop.cpp')), '-o', str(library)]
-    command += [f'-L{root / "lib"}', '-Wl,--allow-shlib-undefined']
-    command += ['-lrcl', '-lrcutils', '-lrosidl_runtime_c']
-    for package in ('nav_msgs', 'geometry_msgs'):
-        command += [f'-l{package}__rosidl_typesupport_c', f'-l{package}__rosidl_generator_c']
-    subprocess.run(command, check=True)
-    return library
-
-
-@contextmanager
-def started(
-    physics: int, publish: int, *more: str, python_loop: bool = False, **environment: str
-) -> Iterator[subprocess.Popen]:
-    """Run sim_node with a disc that stays in the air, with its compiled loop or without."""
-    parameters = (
-        f'physics_rate:={float(physics)}', f'publish_rate:={float(publish)}',
-        f'launch.height:={HIGH}', 'ground:=false', 'command_timeout:=0.5', *more,
-    )  # fmt: skip
-    command = [sys.executable, '-c', PYTHON_LOOP] if python_loop else [*SIM_NODE]
-    command.append('--ros-args')
-    for parameter in parameters:
-        command += ['-p', parameter]
-    with ended(subprocess.Popen(command, env={**os.environ, **environment})) as process:
-        yield process
-
-
-@contextmanager
-def role(*words: str) -> Iterator[subprocess.Popen]:
-    """Run a role of benchmarks/node_roles.py."""
-    command = [sys.executable, str(Path(__file__).with_name('node_roles.py')), *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    with ended(process):
-        yield process
-
-
-@contextmanager
-def ended(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
-    """End a process after the block."""
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def wait_for_line(process: subprocess.Popen) -> None:
-    """Wait until a process has printed a line.
-
-    Raises:
-        TimeoutError: It prints none in time.
-    """
-    if not select.select([process.stdout], [], [], DEADLINE)[0] or not process.stdout.readline():
-        raise TimeoutError(f'{process.args}: no message within {DEADLINE:g} s')
 
 
 def cpu_time(pid: int) -> float:
@@ -347,56 +275,23 @@ def bare_thread(period: float, seconds: float) -> tuple[float, float, float]:
             time.sleep(wait)
         late.append(time.monotonic() - epoch - i * period)
     used = (time.process_time() - cpu) / (time.monotonic() - epoch) * 100
-    late.sort()
-    return used, late[len(late) // 2], late[int(0.99 * len(late))]
+    return used, *quantiles(late)
 
 
-class Watch(Node):
-    """Subscribes to the diagnostics of the simulator."""
-
-    @classmethod
-    @contextmanager
-    def running(cls) -> Iterator['Watch']:
-        """Yield a node that exists while the block runs."""
-        rclpy.init()
-        try:
-            yield cls('watch')
-        finally:
-            rclpy.shutdown()
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
-        self._values: list[dict[str, str]] = []
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        self._values.append({pair.key: pair.value for pair in message.status[0].values})
-
-    def spin(self, seconds: float) -> None:
-        """Take messages for a while [s]."""
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            rclpy.spin_once(self, timeout_sec=0.1)
-
-    def wait(self) -> None:
-        """Wait for the first diagnostics, which do not count."""
-        until = time.monotonic() + DEADLINE
-        while not self._values and time.monotonic() < until:
-            rclpy.spin_once(self, timeout_sec=0.1)
-
-    def medians(self) -> tuple[float, float, float]:
-        """Return medians of real-time factor, lateness p50 and p99 [s]; zeros of a naive node."""
-        rows = self._values[1:] or self._values
-        if not rows:
-            return 0.0, 0.0, 0.0
-        names = ('real_time_factor', 'lateness_p50_s', 'lateness_p99_s')
-        columns = (sorted(float(row[name]) for row in rows) for name in names)
-        factor, p50, p99 = (column[len(column) // 2] for column in columns)
-        return factor, p50, p99
+def quantiles(late: list[float]) -> tuple[float, float]:
+    """Return the medians, over windows, of the median and the p99 of lateness."""
+    count = max(1, len(late) // WINDOW)
+    windows = [sorted(late[i * WINDOW : (i + 1) * WINDOW]) for i in range(count)]
+    p50, p99 = (sorted(w[int(share * len(w))] for w in windows) for share in (0.5, 0.99))
+    return p50[count // 2], p99[count // 2]
 
 
 def command_to_effect() -> int:
-    """Return how many messages after the command its effect is published."""
+    """Return how many messages after the command its effect is published.
+
+    That is by their stamps, which are wall time: messages from before the command can arrive later
+    than it was sent.
+    """
     with started(1000, 1000, 'launch.spin:=0.0'), Watch.running() as node:
         odom: list[Odometry] = []
         node.create_subscription(Odometry, 'odom', odom.append, DEEP)
@@ -406,12 +301,13 @@ def command_to_effect() -> int:
         torque = WrenchStamped()
         torque.header.frame_id = 'disc'
         torque.wrench.torque.z = 0.001
-        before = len(odom)
+        spin = odom[-1].twist.twist.angular.z
+        sent = time.time_ns()
         publisher.publish(torque)
-        while odom[-1].twist.twist.angular.z == odom[before - 1].twist.twist.angular.z:
+        while odom[-1].twist.twist.angular.z == spin:
             rclpy.spin_once(node, timeout_sec=0.1)
-        spin = odom[before - 1].twist.twist.angular.z
-        return next(i for i, m in enumerate(odom[before:]) if m.twist.twist.angular.z != spin) + 1
+        stamp = odom[-1].header.stamp
+        return max(1, math.ceil((stamp.sec * 10**9 + stamp.nanosec - sent) / 1e6))
 
 
 def start_time(**environment: str) -> float:

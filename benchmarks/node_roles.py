@@ -1,10 +1,12 @@
-"""The other processes of benchmarks/node.py: a subscriber, a commander the nodes beside it.
+"""The other processes of benchmarks/node.py: a subscriber, a commander, a sleeper, and peers.
 
-usage: benchmarks/node_roles.py subscribe TOPIC ... | command RATE | naive RATE | rcl LIBRARY RATE
+usage: benchmarks/node_roles.py subscribe TOPIC ... | command RATE | sleep RATE | naive RATE |
+    rcl LIBRARY RATE
 """
 
+from collections import deque
 import ctypes
-import signal
+import os
 import sys
 import time
 
@@ -71,6 +73,22 @@ def command(rate: str) -> None:
         pass
 
 
+def sleep(rate: str) -> None:
+    """Sleep to deadlines until SIGINT, then print how late it woke up for the last 4,096 [s]."""
+    late: deque[float] = deque(maxlen=4096)
+    period = 1.0 / float(rate)
+    epoch, i = time.monotonic(), 1
+    try:
+        while True:
+            wait = epoch + i * period - time.monotonic()
+            if wait > 0.0:
+                time.sleep(wait)
+            late.append(time.monotonic() - epoch - i * period)
+            i += 1
+    except KeyboardInterrupt:
+        print(*late, sep='\n')
+
+
 def naive(rate: str) -> None:
     """Run the node that a first attempt would be."""
     rclpy.init()
@@ -109,18 +127,25 @@ def naive(rate: str) -> None:
 
 
 def rcl(library: str, rate: str) -> None:
-    """Run the C++ program of benchmarks/rcl_loop.cpp."""
+    """Run the C++ program of benchmarks/rcl_loop.cpp, which prints its lateness at SIGINT."""
     rclpy.init()
     node = rclpy.create_node('loader')  # loads what the library calls
     for name in ('odom', 'pose'):
         node.create_publisher(TYPES[name], f'loaded_{name}', 1)
     loop = ctypes.CDLL(library).rcl_loop
     loop.argtypes = [ctypes.c_double]
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    loop.restype = None
     loop(float(rate))
+    sys.stdout.flush()
+    os._exit(0)  # rcl of C++ and of rclpy, in one process, cannot both be shut down
 
 
 if __name__ == '__main__':
-    {'subscribe': subscribe, 'command': command, 'naive': naive, 'rcl': rcl}[sys.argv[1]](
-        *sys.argv[2:]
-    )
+    roles = {
+        'subscribe': subscribe,
+        'command': command,
+        'sleep': sleep,
+        'naive': naive,
+        'rcl': rcl,
+    }
+    roles[sys.argv[1]](*sys.argv[2:])
