@@ -22,7 +22,13 @@ import subprocess
 import sys
 from typing import Any
 
-MODULES = ('disc_sim_ros.ros.sim.node', 'disc_sim_ros.ros.recorder.node')
+IMPORTS = {  # what a program imports first of all, which its first copy waits for
+    'disc_sim_ros.ros.live': 'disc_sim_ros.ros.live.node',
+    'disc_sim_ros.ros.policy': 'disc_sim_ros.ros.policy.node',
+    'disc_sim_ros.ros.recorder': 'disc_sim_ros.ros.recorder.node',
+    'disc_sim_ros.ros.sim': 'disc_sim_ros.ros.sim.node',
+    'disc_sim_ros.ros.throw_when_ready': 'disc_sim_ros.ros.client',
+}
 READ_LATE = {  # variables that a program reads when it initialises ROS, or not at all
     'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE', 'PYTEST_CURRENT_TEST',
     'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID', 'ROS_LOG_DIR',
@@ -93,13 +99,13 @@ class Forked:
 def start(
     module: str, arguments: Sequence[str], output: Path, before: str = ''
 ) -> Forked | subprocess.Popen[bytes]:
-    """Run a module of `MODULES` in a process of its own.
+    """Run a module of `IMPORTS` in a process of its own.
 
     Anew where `before`, Python code, has to run first, or where the environment is another one
     than that of the server, in what is read before ROS is initialised.
 
     Args:
-        module: A package with a `__main__`.
+        module: What `python -m` runs.
         arguments: What follows it on the command line.
         output: The file that gets stdout and stderr.
         before: Python code that runs first.
@@ -107,7 +113,7 @@ def start(
     output.write_bytes(b'')
     if not before and _environment() == _server().environment:
         return Forked(module, arguments, output)
-    program = f'{before}\nimport runpy\nrunpy.run_module({module!r})'
+    program = f'{before}\nimport runpy\nrunpy.run_module({module!r}, run_name="__main__")'
     with output.open('wb') as file:
         command = [sys.executable, '-c', program, *arguments]
         return subprocess.Popen(command, stdout=file, stderr=file)
@@ -157,8 +163,6 @@ def serve(number: int) -> dict[str, Any]:
     Returns:
         In the process of a program: the request for it. The server itself ends with `SystemExit`.
     """
-    for module in MODULES:
-        importlib.import_module(module)
     requests = socket.socket(fileno=number)
     running: dict[int, tuple[int, socket.socket]] = {}  # by what is readable once it has ended
     while True:
@@ -174,14 +178,15 @@ def serve(number: int) -> dict[str, Any]:
         data, handles, _, _ = socket.recv_fds(requests, 1 << 20, 1)
         if not data:
             sys.exit()
-        end = socket.socket(fileno=handles[0])
+        end, request = socket.socket(fileno=handles[0]), json.loads(data)
+        importlib.import_module(IMPORTS[request['module']])
         pid = os.fork()
         if pid == 0:
             for one in (requests, end, *(other for _, other in running.values())):
                 one.close()
             for handle in running:
                 os.close(handle)
-            return json.loads(data)
+            return request
         running[os.pidfd_open(pid)] = pid, end
         end.sendall(f'{pid}\n'.encode())
 
@@ -196,4 +201,4 @@ def become(request: Mapping[str, Any]) -> None:
     os.environ.update(request['environment'])
     os.chdir(request['folder'])
     sys.argv = ['-c', *request['arguments']]
-    runpy.run_module(request['module'])
+    runpy.run_module(request['module'], run_name='__main__')

@@ -17,6 +17,7 @@ rclpy = pytest.importorskip('rclpy')
 
 from disc_sim_ros.ros.processes import started  # noqa: E402 - needs rclpy
 from disc_sim_ros.ros.sim.standard import offers  # noqa: E402 - needs rclpy
+from ros.forked import start  # noqa: E402 - needs rclpy
 from ros.sim_process import DEADLINE  # noqa: E402 - needs rclpy
 from security.policies import read_policy  # noqa: E402 - as above
 
@@ -71,13 +72,8 @@ def test_the_simulator_opens_what_its_policy_allows_and_nothing_else(ros):
 def test_the_recorder_opens_what_its_policy_allows(ros, tmp_path):
     policy = read_policy('recorder_node')
     ros.start({'auto_throw': False})
-    process = subprocess.Popen(
-        [
-            *(sys.executable, '-m', 'disc_sim_ros.ros.recorder'),
-            *('--ros-args', '-p', f'bag:={tmp_path / "bag"}'),
-        ],
-        stderr=subprocess.DEVNULL,
-    )
+    arguments = ['--ros-args', '-p', f'bag:={tmp_path / "bag"}']
+    process = start('disc_sim_ros.ros.recorder', arguments, tmp_path / 'recorder.txt')
     try:
         ros.spin_until(
             lambda: 'rt/odom' in opened(ros.node, 'recorder_node')[1],

@@ -30,6 +30,7 @@ from disc_sim_ros.ros.live import discs
 from disc_sim_ros.ros.live.node import SENT
 from disc_sim_ros.ros.live.options import live_config
 from disc_sim_ros.ros.live.server import LiveServer
+from ros.forked import start
 from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros
@@ -178,9 +179,7 @@ def test_a_disc_without_attitude_lies_level():
 def live(ros, tmp_path):
     """The process of live_view and the address of its page."""
     log = tmp_path / 'live.txt'
-    command = [sys.executable, '-m', 'disc_sim_ros.ros.live', '--ros-args', '-p', 'port:=0']
-    with log.open('wb') as file:
-        process = subprocess.Popen(command, stdout=file, stderr=file)
+    process = start('disc_sim_ros.ros.live', ['--ros-args', '-p', 'port:=0'], log)
     try:
         end = time.monotonic() + DEADLINE
         while (match := re.search(r'http://\S+', log.read_text())) is None:

@@ -1,9 +1,5 @@
 """policy_node: in lockstep the disc of a real simulator flies the path of the environment."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -19,6 +15,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.ros.policy.node import _read
 from disc_sim_ros.ros.policy.options import policy_config
+from ros.forked import start
 from ros.sim.sim_messages import wall
 from ros.sim_process import DEADLINE
 
@@ -41,24 +38,20 @@ def path_of_environment() -> tuple[np.ndarray, dict]:
     return frames.odometry_array(states[:-1]), info
 
 
-def test_in_lockstep_the_path_is_that_of_the_environment_to_the_bit(ros):
+def test_in_lockstep_the_path_is_that_of_the_environment_to_the_bit(ros, tmp_path):
     launch = {f'launch.{name}': value for name, value in LAUNCH.items()}
     wind = {f'wind.{axis}': value for axis, value in zip('xyz', WIND, strict=True)}
     sim = ros.start({'auto_throw': False, **RATES, **launch, **wind})
     messages = ros.subscribe(Odometry, topics.ODOM)
     ros.spin_until(lambda: messages, 'odometry')  # then the subscription is matched
-    arguments = ['-p', f'target:={list(TARGET)}', '-p', 'lockstep:=true']
-    node = subprocess.Popen(
-        [sys.executable, '-m', 'disc_sim_ros.ros.policy', '--ros-args', *arguments],
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ,
-    )
+    arguments = ['--ros-args', '-p', f'target:={list(TARGET)}', '-p', 'lockstep:=true']
+    log = tmp_path / 'policy.txt'
+    node = start('disc_sim_ros.ros.policy', arguments, log)
     try:
         ros.spin_until(lambda: node.poll() is not None, 'the end of policy_node', 2 * DEADLINE)
     finally:
         node.kill()
-        errors = node.communicate()[1]
+    errors = log.read_text()
     assert node.returncode == 0, errors + sim.stderr
     expected, info = path_of_environment()
     flying = [numbers for _, numbers in map(_read, messages) if any(numbers[7:])]
@@ -76,16 +69,7 @@ def test_a_disc_that_is_put_back_in_flight_has_not_landed(ros, tmp_path):
     sim = ros.start({'auto_throw': False, 'launch.height': 5.0, 'real_time_factor': 2.0})
     messages = ros.subscribe(Odometry, topics.ODOM)
     log = tmp_path / 'policy.txt'
-    command = [
-        sys.executable,
-        '-m',
-        'disc_sim_ros.ros.policy',
-        '--ros-args',
-        '-p',
-        'target:=[9,0]',
-    ]
-    with log.open('wb') as file:
-        node = subprocess.Popen(command, stdout=file, stderr=file)
+    node = start('disc_sim_ros.ros.policy', ['--ros-args', '-p', 'target:=[9,0]'], log)
     try:
         ros.spin_until(lambda: 'steering to' in log.read_text(), 'the node')
         ros.publisher(Odometry, 'throw')  # as long as it takes to match endpoints
