@@ -91,7 +91,7 @@ def test_unusual_flights_can_be_drawn(fly, tmp_path, arguments):
     assert (tmp_path / 'x.png').stat().st_size > 10_000
 
 
-@pytest.mark.parametrize('name', ['$\\frac$', '飛盤', os.fsdecode(b'x\xff'), '100 % & <b>_^{'])
+@pytest.mark.parametrize('name', ['$\\frac$', os.fsdecode(b'100 % & <b>_^{ \xe9\xa3\x9b \xff')])
 def test_discs_with_unusual_names_can_be_drawn(fly, tmp_path, name):
     """A dollar starts mathematics in matplotlib, and its font lacks some scripts."""
     path = tmp_path / f'{name}.yaml'

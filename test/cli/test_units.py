@@ -70,7 +70,8 @@ def test_a_bag_is_told_in_both_systems(tmp_path, capsys):
 
 
 def test_a_prediction_is_told_in_both_systems(tmp_path, capsys):
-    assert fly.main(['--bag', str(tmp_path / 'bag'), '--wind', '3', '1', '0']) == 0
+    short = ['--speed', '14', '--pitch', '-2', '--height', '1']  # of 1 s
+    assert fly.main(['--bag', str(tmp_path / 'bag'), '--wind', '3', '1', '0', *short]) == 0
     capsys.readouterr()
     texts = {}
     for system in ('metric', 'us'):

@@ -14,7 +14,10 @@ from disc_sim_ros.physics.launch import Launch
 from view.test_browser import SIZES, shown_at
 
 pytest.importorskip('trimesh')
-pytestmark = pytest.mark.skipif(browser.program() is None, reason=browser.MISSING)
+pytestmark = [
+    pytest.mark.skipif(browser.program() is None, reason=browser.MISSING),
+    pytest.mark.xdist_group('browser'),  # identified once
+]
 LAUNCH = Launch(speed=18.0, pitch=10.0, spin=60.0, height=1.3)
 
 
