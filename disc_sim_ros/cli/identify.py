@@ -18,6 +18,7 @@ from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file, flight
 from disc_sim_ros.physics.disc import AERODYNAMICS
 from disc_sim_ros.quantities import COEFFICIENTS, IDENTIFICATION, LAUNCH, MEAN_WIND
+from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
     from disc_sim_ros.estimation.crossvalidation import LeftOut
@@ -139,6 +140,7 @@ def parser(prog: str = 'identify') -> Parser:
         '(needs trimesh), and the numbers as report.json',
     )
     search.add_argument('--json', action='store_true', help='print one JSON document')
+    output.add_units(search)
     return p
 
 
@@ -183,7 +185,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     if chosen.json:
         output.show(json.dumps(report.document(result, misses), allow_nan=False))
     else:
-        output.show(report.text(result, misses))
+        output.show(report.text(result, misses, SYSTEMS[chosen.units]))
     _write_outputs(chosen, result, misses, identify_report.provenance(chosen, words))
     return 130 if result.interrupted else 0
 
@@ -209,7 +211,8 @@ def _write_outputs(
 
     written = []
     if hasattr(chosen, 'report'):
-        identify_report.write(Path(chosen.report), result, misses, provenance)
+        system = SYSTEMS[chosen.units]
+        identify_report.write(Path(chosen.report), result, misses, provenance, system)
         written.append(f'wrote {Path(chosen.report) / "report.html"}')
     if hasattr(chosen, 'out') and result.problem.free:
         text = report.disc_file(result, Path(chosen.out).stem, provenance)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from disc_sim_ros import __version__, files
 from disc_sim_ros.cli import pages
-from disc_sim_ros.units import METRIC
+from disc_sim_ros.units import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,16 +33,27 @@ def provenance(chosen: argparse.Namespace, words: Sequence[str]) -> list[str]:
 
 
 def write(
-    folder: Path, result: 'Identification', misses: 'Sequence[LeftOut]', lines: Sequence[str]
+    folder: Path,
+    result: 'Identification',
+    misses: 'Sequence[LeftOut]',
+    lines: Sequence[str],
+    system: System,
 ) -> None:
-    """Write a new folder with report.html, report.json and, if it can be made, throws.html."""
+    """Write a new folder with report.html, report.json and, if it can be made, throws.html.
+
+    The pages are in a system of units, report.json in SI units.
+    """
     from disc_sim_ros.estimation import plots, report  # noqa: PLC0415
 
-    figures = [plots.paths(result), plots.residuals(result), plots.correlations(result)]
-    text = report.text(result, misses)
+    figures = [
+        plots.paths(result, system),
+        plots.residuals(result, system),
+        plots.correlations(result),
+    ]
+    text = report.text(result, misses, system)
     document = json.dumps(report.document(result, misses), allow_nan=False, indent=1)
     pictures = '\n'.join(_picture(figure) for figure in figures if figure is not None)
-    throws = _page_of_throws(result)
+    throws = _page_of_throws(result, system)
     link = '<p><a href="throws.html">The fitted flights in 3D</a></p>' if throws else ''
     escaped = html.escape('\n'.join([*lines, '', text]))
     page = (
@@ -62,7 +73,7 @@ def write(
             (made / 'throws.html').write_bytes(throws)
 
 
-def _page_of_throws(result: 'Identification') -> bytes:
+def _page_of_throws(result: 'Identification', system: System) -> bytes:
     """Return a page of the fitted flights; empty without the package for pages."""
     from disc_sim_ros.view.page import ViewerMissingError, page  # noqa: PLC0415
     from disc_sim_ros.view.shown import ShownFlight  # noqa: PLC0415
@@ -77,7 +88,7 @@ def _page_of_throws(result: 'Identification') -> bytes:
         for k, throw in enumerate(result.problem.throws)
     ]
     try:
-        return page(flights, 'Throws fitted by identify', METRIC)
+        return page(flights, 'Throws fitted by identify', system)
     except ViewerMissingError:
         return b''
 

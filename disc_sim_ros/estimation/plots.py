@@ -4,11 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from disc_sim_ros import plot_axes
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import Identification
 from disc_sim_ros.estimation.observations import UNITS, Camera, Positions
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.physics.frames import map_from_paper
+from disc_sim_ros.units import METRIC, System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 _MOST_NAMES = 8  # throws in a legend
 
 
-def paths(result: Identification) -> 'Figure | None':
+def paths(result: Identification, system: System = METRIC) -> 'Figure | None':
     """Return measured and fitted paths from above and from the side; None without positions."""
     drawn = []
     for k, throw in enumerate(result.problem.throws):
@@ -39,7 +41,9 @@ def paths(result: Identification) -> 'Figure | None':
                 (line,) = ax.plot(fitted[:, 0], fitted[:, column], color=_colour(i), label=name)
                 dots = measured[:, 0], measured[:, column]
                 ax.plot(*dots, '.', ms=3, color=line.get_color(), alpha=0.5)
-        ax.set(xlabel='x, m', ylabel=label, title=title)
+        ax.set_title(title)
+        plot_axes.label(ax.xaxis, 'x, m', system)
+        plot_axes.label(ax.yaxis, label, system)
         ax.set_aspect('equal', adjustable='datalim')
         ax.grid(color='0.9')
         _legend(ax, len(drawn))
@@ -52,7 +56,7 @@ def _in_map(points: FloatArray) -> FloatArray:
     return map_from_paper(np.pad(points, ((0, 0), (0, 3 - d))))[:, :d]
 
 
-def residuals(result: Identification) -> 'Figure':
+def residuals(result: Identification, system: System = METRIC) -> 'Figure':
     """Return the residuals of each instrument over time."""
     kinds = sorted({o.kind for throw in result.problem.throws for o in throw.observations})
     figure, axes = _figure(len(kinds), 3.0 * len(kinds))
@@ -64,7 +68,8 @@ def residuals(result: Identification) -> 'Figure':
                     rms = np.sqrt((r**2).mean(axis=1))
                     ax.plot(o.t, rms, lw=0.8, color=_colour(k), label=throw.name)
         ax.axhline(result.problem.noise[kind], color='0.5', ls='--', lw=1.0, label='noise')
-        ax.set(xlabel='time, s', ylabel=f'residual, {UNITS[kind]}', ylim=(0.0, None))
+        ax.set(xlabel='time, s', ylim=(0.0, None))
+        plot_axes.label(ax.yaxis, f'residual, {UNITS[kind]}', system)
         ax.set_title(f'{kind}: fitted less measured, rms of the components')
         _legend(ax, len(result.problem.throws))
     return figure

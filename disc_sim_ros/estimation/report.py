@@ -16,14 +16,15 @@ from disc_sim_ros.estimation.observations import UNITS
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.disc_file import disc_document
 from disc_sim_ros.quantities import COEFFICIENTS
+from disc_sim_ros.units import METRIC, System
 
 _STRETCHED = 1.2  # factor of a standard error from which on the report names it
 _GOOD = 0.1  # of the spread or of the value: what counts as known well
 _OFFSETS = {'C_L0': 'lift_offset', 'C_D0': 'drag_offset', 'C_M0': 'pitching_offset'}
 
 
-def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
-    """Return the result for a terminal."""
+def text(result: Identification, left_out: Sequence[LeftOut], system: System = METRIC) -> str:
+    """Return the result for a terminal, in a system of units."""
     problem = result.problem
     base = result.base.values
     lines = [
@@ -38,16 +39,18 @@ def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
     shared = zip(problem.names, result.x, result.shared_errors, strict=False)
     for name, value, error in list(shared)[len(problem.free) :]:
         unit = 'm' if name.startswith('camera') else 'm/s'
-        lines.append(f'  {name:<12} {value:>11.3g} {error:10.2g} {unit:>11}')
+        shown, within = system.number(value, unit), system.number(error, unit)
+        lines.append(f'  {name:<12} {shown:>11.3g} {within:10.2g} {system.unit(unit):>11}')
     lines += [f'  left at the base: {one.reason}' for one in result.left_out]
     strongest = _strongest(result)
     if strongest:
         lines.append(f'  {strongest}')
     for kind in sorted({o.kind for throw in problem.throws for o in throw.observations}):
-        lines.append(
-            f'  residuals of {kind}: {result.rms(kind):.3g} {UNITS[kind]} rms, noise taken as '
-            f'{problem.noise[kind]:.3g} {UNITS[kind]}'
+        rms, noise = (
+            system.text(value, UNITS[kind], '.3g')
+            for value in (result.rms(kind), problem.noise[kind])
         )
+        lines.append(f'  residuals of {kind}: {rms} rms, noise taken as {noise}')
     if result.widening > 1.0:
         lines.append(
             f'  residuals are correlated in time: something is not modelled; standard errors are '
@@ -65,9 +68,11 @@ def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
         )
     for throw, miss in zip(problem.throws, left_out, strict=False):
         if miss.from_path is not None:
-            line = f'  without {throw.name}: its last point is missed by {miss.from_path:.2f} m'
+            off = system.text(miss.from_path, 'm')
+            line = f'  without {throw.name}: its last point is missed by {off}'
             if miss.from_release is not None:
-                line += f', from its measured release by {miss.from_release:.2f} m'
+                off = system.text(miss.from_release, 'm')
+                line += f', from its measured release by {off}'
             lines.append(line)
     for gauge in sorted({gauge for throw in problem.throws for gauge in throw.gauges}):
         lines.append(f'  {gauge}')
@@ -76,7 +81,7 @@ def text(result: Identification, left_out: Sequence[LeftOut]) -> str:
             '  a gyro alone: another solution may fit nearly as well, far outside the errors; '
             'measure a path, an attitude or a release too'
         )
-    lines.append(f'  {verdict(result, left_out)}')
+    lines.append(f'  {verdict(result, left_out, system)}')
     return '\n'.join(lines)
 
 
@@ -94,7 +99,7 @@ def _strongest(result: Identification) -> str:
     return f'{names[i]} and {names[j]} are correlated: {value:.3f}; together they are known better'
 
 
-def verdict(result: Identification, left_out: Sequence[LeftOut]) -> str:
+def verdict(result: Identification, left_out: Sequence[LeftOut], system: System = METRIC) -> str:
     """Return what the result is worth, in words."""
     spread = result.problem.prior.coefficients
     known = [
@@ -108,7 +113,8 @@ def verdict(result: Identification, left_out: Sequence[LeftOut]) -> str:
     ]
     misses = [miss.from_path for miss in left_out if miss.from_path is not None]
     if misses:
-        words.append(f'a throw that was not used is missed by {np.mean(misses):.2f} m in the mean')
+        off = system.text(float(np.mean(misses)), 'm')
+        words.append(f'a throw that was not used is missed by {off} in the mean')
     if result.widening > 2.0:
         words.append('the model leaves a pattern in the residuals: trust paths more than numbers')
     return '; '.join(words)

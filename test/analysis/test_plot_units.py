@@ -1,14 +1,21 @@
 """Plots with `--units us` show the same data as in metric units, numbered in feet, mph and rpm."""
 
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 import re
 
 from matplotlib.text import Text
+import numpy as np
 from numpy.testing import assert_array_equal
 import pytest
 
 from disc_sim_ros.analysis import bag_analysis, flights, plots, recording
 from disc_sim_ros.bags.reader import open_bag
+from disc_sim_ros.estimation import plots as estimation_plots
+from disc_sim_ros.estimation import report
+from disc_sim_ros.estimation.coefficients import base_of
+from disc_sim_ros.estimation.identification import identify
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup, fly
@@ -20,6 +27,7 @@ from disc_sim_ros.studies.scatter import Normal
 from disc_sim_ros.studies.study import Study
 from disc_sim_ros.studies.summary import summarise
 from disc_sim_ros.units import SYSTEMS
+from estimation import synthetic_sessions
 
 SAMPLE = Path(__file__).parents[2] / 'samples' / 'fig5'
 FACTORS = {'ft': ('m', 0.3048), 'mph': ('m/s', 0.44704), 'rpm': ('rad/s', 3.14159265359 / 30.0)}
@@ -73,8 +81,55 @@ def optimum(system):
     return optimise_plots.figure(optimise.optimise(problem, seed=1), system)
 
 
+@cache
+def identified():
+    generator = np.random.default_rng(4)
+    setup = Setup(disc=load_disc('ultrastar'))
+    values = base_of(setup).values
+    throws = synthetic_sessions.session(
+        values, replace(setup, step=1e-3), ('position', 'gyro'), generator, count=1
+    )
+    return identify(throws, setup, free=['C_D0'], starts=1)
+
+
+def fitted_paths(system):
+    return estimation_plots.paths(identified(), system)
+
+
+def residuals(system):
+    return estimation_plots.residuals(identified(), system)
+
+
+def test_the_report_of_an_identification_has_the_same_numbers_in_both_systems():
+    metric, us = (report.text(identified(), [], SYSTEMS[name]) for name in ('metric', 'us'))
+    assert METRIC.search(metric)
+    assert not METRIC.search(us)
+    values = {}
+    for text in (metric, us):
+        match = re.search(
+            r'residuals of gyro: (\S+) \S+ rms.*residuals of position: (\S+)', text, re.S
+        )
+        wind = re.search(r'wind_x +(\S+) +(\S+)', text)
+        values[text] = [float(x) for x in (*match.groups(), *wind.groups())]
+    factors = [FACTORS[unit][1] for unit in ('rpm', 'ft', 'mph', 'mph')]
+    for si, number, factor in zip(values[metric], values[us], factors, strict=True):
+        assert number * factor == pytest.approx(si, rel=0.05)  # of two digits
+
+
 @pytest.mark.parametrize(
-    'drawn', [flight, comparison, bag, landings, curves, maps, best_curves, optimum]
+    'drawn',
+    [
+        flight,
+        comparison,
+        bag,
+        landings,
+        curves,
+        maps,
+        best_curves,
+        optimum,
+        fitted_paths,
+        residuals,
+    ],
 )
 def test_a_plot_has_the_same_data_in_both_systems(drawn):
     metric, us = (drawn(SYSTEMS[name]) for name in ('metric', 'us'))
