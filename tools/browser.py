@@ -42,8 +42,8 @@ class Browser:
 
     Attributes:
         problems: Errors and warnings of the console, exceptions and failed requests, since the
-            start.
-        requests: Addresses that pages have asked for.
+            last `show_as`.
+        requests: Addresses that pages have asked for since then.
     """
 
     def __init__(
@@ -83,12 +83,13 @@ class Browser:
         os.set_blocking(self._from, False)
         self._session = ''
         try:
-            self._attach(width, height, phone=phone, dark=dark)
+            self._attach()
+            self.show_as(width, height, phone=phone, dark=dark)
         except BaseException:
             self.close()
             raise
 
-    def _attach(self, width: int, height: int, *, phone: bool, dark: bool) -> None:
+    def _attach(self) -> None:
         target = next(
             t for t in self.send('Target.getTargets')['targetInfos'] if t['type'] == 'page'
         )
@@ -96,12 +97,16 @@ class Browser:
         self._session = attached['sessionId']
         for domain in ('Page', 'Runtime', 'Log', 'Network'):
             self.send(f'{domain}.enable')
+
+    def show_as(self, width: int, height: int, *, phone: bool = False, dark: bool = False) -> None:
+        """Be a window of this size, or the screen of a phone; forget problems and requests."""
+        self.problems.clear()
+        self.requests.clear()
         self.send(
             'Emulation.setDeviceMetricsOverride',
             width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,
         )  # fmt: skip
-        if phone:
-            self.send('Emulation.setTouchEmulationEnabled', enabled=True)
+        self.send('Emulation.setTouchEmulationEnabled', enabled=phone)
         scheme = {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}
         self.send('Emulation.setEmulatedMedia', features=[scheme])
 

@@ -40,10 +40,10 @@ def file(trajectory, tmp_path_factory):
 
 
 @pytest.mark.parametrize('size', SIZES)
-def test_the_fitted_flight_flies_past_the_measured_points(file, trajectory, size):
+def test_the_fitted_flight_flies_past_the_measured_points(file, trajectory, size, chromium):
     """The positions have no noise, so the fit is within a centimetre of them."""
     places = map_from_paper(trajectory.position)
-    with shown_at(size, file) as tab:
+    with shown_at(chromium, size, file) as tab:
         for k in (10, 60):
             tab.value(f'discView.play(false), discView.seek({trajectory.t[k]})')
             assert tab.value('discView.pose(0)')['position'] == pytest.approx(places[k], abs=0.01)

@@ -56,8 +56,8 @@ def csv(flown, tmp_path):
 
 
 @pytest.fixture(scope='module', params=SIZES)
-def opened(request, file):
-    with shown_at(request.param, file) as tab:
+def opened(request, file, chromium):
+    with shown_at(chromium, request.param, file) as tab:
         yield tab
 
 
