@@ -49,13 +49,26 @@ def many_throws(throws) -> list[Throw]:
     return [*throws, *(throw(SETUP, PRIOR, seed) for seed in range(10, 24))]
 
 
-def test_landing_is_known_after_a_second(many_throws):
+@pytest.fixture(scope='module', params=[True, False], ids=['attitude', 'position'])
+def after_a_second(request, many_throws) -> list[Prediction]:
+    """The predictions of all throws 1 s after the release, from measurements of a kind."""
+    return [follow(t.measurements(axis=request.param), 1.0) for t in many_throws]
+
+
+@pytest.fixture(scope='module')
+def by_position(throws) -> list[float]:
+    """The misses of ten throws after 1.5 s, from positions."""
+    return [miss(follow(t.measurements(), 1.5), t) for t in throws]
+
+
+@pytest.mark.xdist_group('predicted')  # once
+@pytest.mark.parametrize('after_a_second', [True], indirect=True)
+def test_landing_is_known_after_a_second(many_throws, after_a_second):
     """The bound of these throws is 0.25 m with attitude (benchmarks/predictor.py).
 
     The median of 24 throws lies within a factor of 1.5 of that of many.
     """
-    misses = [miss(follow(t.measurements(axis=True), 1.0), t) for t in many_throws]
-    assert np.median(misses) < 0.45
+    assert np.median(list(map(miss, after_a_second, many_throws))) < 0.45
 
 
 def test_a_forehand_is_followed_as_a_backhand_is():
@@ -71,13 +84,12 @@ def test_a_forehand_is_followed_as_a_backhand_is():
         assert unknown.landing == pytest.approx(known.landing, abs=0.1)
 
 
-def test_positions_alone_need_longer(throws):
-    misses = {
-        until: np.median([miss(follow(t.measurements(), until), t) for t in throws])
-        for until in (0.5, 1.5)
-    }
-    assert misses[1.5] < 0.7  # bound 0.3 m; a parabola misses by several metres
-    assert misses[1.5] < misses[0.5]
+@pytest.mark.xdist_group('predicted')
+def test_positions_alone_need_longer(throws, by_position):
+    early = np.median([miss(follow(t.measurements(), 0.5), t) for t in throws])
+    late = np.median(by_position)
+    assert late < 0.7  # bound 0.3 m; a parabola misses by several metres
+    assert late < early
 
 
 def test_last_prediction_is_within_centimetres(throws):
@@ -88,22 +100,14 @@ def test_last_prediction_is_within_centimetres(throws):
         assert prediction.landing_time == pytest.approx(t.landing[2], abs=0.02)
 
 
-@pytest.mark.parametrize('axis', [True, False], ids=['attitude', 'position'])
-def test_ellipse_is_of_the_size_of_the_miss(many_throws, axis):
+@pytest.mark.xdist_group('predicted')
+def test_ellipse_is_of_the_size_of_the_miss(many_throws, after_a_second):
     """Nine of ten landings lie in a right ellipse; of 24, fewer than 15 are 1 in 10^6.
 
     Half of them would lie in an ellipse half as long and wide (with 44 %, 15 are 1 in 20).
     """
     inside = 0
-    for t in many_throws:
-        predictor = Predictor(CONFIG)
-        prediction = None
-        for k, m in enumerate(t.measurements(axis=axis)):
-            if m.time > 1.0:
-                break
-            predictor.add(m)
-            if k < 12 or k % 4 == 0:
-                prediction = predictor.update(ellipse=m.time > 0.98) or prediction
+    for t, prediction in zip(many_throws, after_a_second, strict=True):
         off = prediction.landing - t.landing[:2]
         inside += off @ np.linalg.solve(prediction.covariance[:2, :2], off) < INSIDE
         assert np.sqrt(np.trace(prediction.covariance[:2, :2])) < 20.0
@@ -116,17 +120,17 @@ def test_same_measurements_give_the_same_bits(throws):
     assert first.covariance.tobytes() == second.covariance.tobytes()
 
 
-def test_outliers_of_metres_cost_little(throws):
-    clean, spoiled = [], []
+@pytest.mark.xdist_group('predicted')
+def test_outliers_of_metres_cost_little(throws, by_position):
+    spoiled = []
     for seed, t in enumerate(throws):
         rng = np.random.default_rng(seed)
         position = t.position.copy()
         bad = rng.random(len(position)) < 0.1
         position[bad] += rng.normal(0.0, 5.0, (bad.sum(), 3))
         dirty = replace(t, position=position)
-        clean.append(miss(follow(t.measurements(), 1.5), t))
         spoiled.append(miss(follow(dirty.measurements(), 1.5), t))
-    assert np.median(spoiled) < 2.0 * np.median(clean)  # the scatter of medians of ten
+    assert np.median(spoiled) < 2.0 * np.median(by_position)  # the scatter of medians of ten
 
 
 def test_throw_begins_after_the_hand_and_ends_on_the_ground(throws):
