@@ -7,6 +7,7 @@ import warnings
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
+from PIL import Image
 
 from disc_sim_ros import topics
 from disc_sim_ros.analysis.flight_report import columns
@@ -39,6 +40,7 @@ _INPUT_LABELS = {
 }
 _STYLES = ('-', '--', ':')
 _LEGEND_LIMIT = 8  # flights in a legend, at most
+_DPI = 120
 
 
 def flight_figure(flight: 'Flight', system: System = METRIC) -> Figure:
@@ -215,5 +217,12 @@ def image(figure: Figure, kind: str) -> bytes:
     with warnings.catch_warnings():
         # A disc name in a script that the font lacks is drawn as boxes, without a warning.
         warnings.filterwarnings('ignore', message='Glyph .* missing from font')
-        figure.savefig(buffer, format=kind, dpi=120)
+        if kind == 'png':  # `savefig` would draw it twice, first for the layout alone
+            figure.set_dpi(_DPI)
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()  # type: ignore[no-untyped-call]
+            pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+            Image.fromarray(pixels).save(buffer, format='png', dpi=(_DPI, _DPI))
+        else:
+            figure.savefig(buffer, format=kind)
     return buffer.getvalue()
