@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from disc_sim_ros.envs import policy
 from disc_sim_ros.envs.steer import SteerVectorEnv
 
-THROWS = 1024
+THROWS = 512
 
 
 def misses(act) -> np.ndarray:

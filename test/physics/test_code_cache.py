@@ -1,18 +1,22 @@
 """The cache of machine code: without a place, on a full disk, at first starts at the same time."""
 
+import itertools
 import os
 from pathlib import Path
 import re
-import subprocess
-import sys
 
 import pytest
 
 from disc_sim_ros.physics.kernels import jit
+from forked import Forked
 
-pytestmark = pytest.mark.skipif(not jit.COMPILED, reason='without compilation there is no cache')
+pytestmark = [
+    pytest.mark.skipif(not jit.COMPILED, reason='without compilation there is no cache'),
+    pytest.mark.xdist_group('code cache'),  # numba is loaded once
+]
 SCRIPT = """
-import resource, signal, sys
+import resource, signal, sys, warnings
+warnings.simplefilter('error')
 if 'full' in sys.argv:  # no file may grow beyond 1 kB: writing fails as on a full disk
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
@@ -29,26 +33,35 @@ print(triple(2.0), triple.hits, cache_folder())
 
 @pytest.fixture
 def start(tmp_path):
-    """Return a function that starts a program with one kernel, in an environment of its own."""
+    """Return a function that starts a program with one kernel, in an environment of its own.
+
+    It starts with numba, which takes most of the time and knows nothing of the cache.
+    """
     script = tmp_path / 'script.py'
     script.write_text(SCRIPT, encoding='utf-8')
     places = {'HOME', 'NUMBA_CACHE_DIR', 'XDG_CACHE_HOME'}
+    numbers = itertools.count()
     others = {name: value for name, value in os.environ.items() if name not in places}
 
     def start(*words, **environment):
-        return subprocess.Popen(
-            [sys.executable, '-W', 'error', script, *words], env=others | environment,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        written = [tmp_path / f'{name}_{next(numbers)}' for name in ('output', 'errors')]
+        for path in written:
+            path.touch()
+        process = Forked(
+            script, words, written[0],
+            errors=written[1], environment=others | environment, imports='physics.numba_ready',
         )  # fmt: skip
+        return process, *written
 
     return start
 
 
-def result_of(process):
+def result_of(started):
     """Return the number, the hits in the cache and its folder; then what went to stderr."""
-    stdout, stderr = process.communicate(timeout=120)
-    assert process.returncode == 0, stderr
-    return tuple(stdout.split()), stderr
+    process, output, errors = started
+    code, stderr = process.wait(120), errors.read_text()
+    assert code == 0, stderr
+    return tuple(output.read_text().split()), stderr
 
 
 def test_a_home_that_does_not_exist_is_not_made(start, tmp_path):
@@ -86,8 +99,8 @@ def test_a_full_disk_costs_one_line_and_the_next_start_is_sound(start, tmp_path)
 
 def test_first_starts_at_once_do_not_disturb_each_other(start, tmp_path):
     place = {'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
-    for process in [start(**place) for _ in range(3)]:
-        (number, _, _), stderr = result_of(process)
+    for started in [start(**place) for _ in range(3)]:
+        (number, _, _), stderr = result_of(started)
         assert (number, stderr) == ('6.0', '')
     (number, hits, _), stderr = result_of(start(**place))
     assert (number, hits, stderr) == ('6.0', '1', '')

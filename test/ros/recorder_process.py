@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
 from disc_sim_ros.bags.reader import open_bag
-from ros.forked import start
+from forked import start
 from ros.sim_process import DEADLINE, Harness
 
 RELIABLE = QoSProfile(depth=20_000)

@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-from ros.forked import start
+from forked import start
 
 DEADLINE = 60.0  # s of wall time for what takes less than one on an idle machine
 ALL_QOS = QoSProfile(depth=100_000)  # reliable: a slow test loses nothing

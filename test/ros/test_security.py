@@ -17,7 +17,7 @@ rclpy = pytest.importorskip('rclpy')
 
 from disc_sim_ros.ros.processes import started  # noqa: E402 - needs rclpy
 from disc_sim_ros.ros.sim.standard import offers  # noqa: E402 - needs rclpy
-from ros.forked import start  # noqa: E402 - needs rclpy
+from forked import start  # noqa: E402 - needs rclpy
 from ros.sim_process import DEADLINE  # noqa: E402 - needs rclpy
 from security.policies import read_policy  # noqa: E402 - as above
 

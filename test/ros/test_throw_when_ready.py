@@ -17,7 +17,7 @@ from disc_sim_ros.bags.reader import open_bag
 from disc_sim_ros.ros.client import recorded_messages
 from disc_sim_ros.ros.processes import started
 from disc_sim_ros.topics import PredictorTopic
-from ros.forked import start
+from forked import start
 from ros.recorder_process import Recorder
 from ros.sim.sim_messages import names, wall
 

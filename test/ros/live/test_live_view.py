@@ -30,7 +30,7 @@ from disc_sim_ros.ros.live import discs
 from disc_sim_ros.ros.live.node import SENT
 from disc_sim_ros.ros.live.options import live_config
 from disc_sim_ros.ros.live.server import LiveServer
-from ros.forked import start
+from forked import start
 from ros.sim_process import DEADLINE
 
 pytestmark = pytest.mark.ros

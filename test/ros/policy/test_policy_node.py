@@ -15,7 +15,7 @@ from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
 from disc_sim_ros.ros.policy.node import _read
 from disc_sim_ros.ros.policy.options import policy_config
-from ros.forked import start
+from forked import start
 from ros.sim.sim_messages import wall
 from ros.sim_process import DEADLINE
 
