@@ -13,49 +13,18 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.estimation.coefficients import NAMES, base_of
+from disc_sim_ros.estimation.coefficients import NAMES
 from disc_sim_ros.estimation.identification import Identification, identify
-from disc_sim_ros.estimation.observations import GYRO, NOISE
-from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw
+from disc_sim_ros.estimation.observations import NOISE
+from disc_sim_ros.estimation.throws import RELEASE_SIZE
 from disc_sim_ros.physics.disc_file import load_disc
-from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup
-from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.launch import Launch
-from disc_sim_ros.quantities import COEFFICIENT_SPREAD, COEFFICIENTS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from estimation import synthetic_sessions
 
 BASE = Setup(disc=load_disc('ultrastar'))
-SHARE = 0.3  # of the spread of discs: how far the true disc lies from the base, one deviation
-SPIN_ERROR = 3.0  # rad/s, of the spin that is told where no gyro measures it
-
-
-def truth(generator: np.random.Generator) -> FloatArray:
-    """Draw the coefficients of a disc."""
-    base = base_of(BASE)
-    spread = np.array([COEFFICIENT_SPREAD[name] for name in NAMES])
-    values = base.values + SHARE * spread * generator.standard_normal(len(NAMES))
-    low = [COEFFICIENTS[name].lowest for name in NAMES]
-    high = [COEFFICIENTS[name].highest for name in NAMES]
-    low[NAMES.index('damping')] = 0.2  # a factor near 0 wobbles for ever
-    return np.clip(values, low, high)
-
-
-def session(
-    seed: int, count: int, kinds: tuple[str, ...]
-) -> tuple[FloatArray, FloatArray, list[tuple[Throw, Launch]]]:
-    """Return the true coefficients, the true wind and the throws with their true releases."""
-    generator = np.random.default_rng(seed)
-    values = truth(generator)
-    wind = generator.normal(0.0, 2.0, 2)
-    setup = replace(BASE, step=5e-4, wind=Wind(mean=flip_yz((*wind, 0.0))))
-    error = None if GYRO in kinds else SPIN_ERROR
-    throws = synthetic_sessions.thrown(
-        values, setup, kinds, generator, count=count, spin_error=error
-    )
-    return values, wind, throws
 
 
 def bound(
@@ -103,7 +72,7 @@ def main() -> None:
     over_bound: list[FloatArray] = []
     whole, seconds = 0, []
     for seed in range(chosen.first, chosen.first + chosen.sessions):
-        values, wind, throws = session(seed, chosen.throws, kinds)
+        values, wind, throws = synthetic_sessions.drawn(seed, BASE, kinds, count=chosen.throws)
         started, cpu = time.monotonic(), time.process_time()
         try:
             result = identify([throw for throw, _ in throws], BASE)

@@ -7,11 +7,10 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.fitting import Progress, solve
 from disc_sim_ros.estimation.identification import Identification
-from disc_sim_ros.estimation.observations import Camera, Observation, Positions
+from disc_sim_ros.estimation.observations import FEWEST, Camera, Positions
 from disc_sim_ros.estimation.problem import Prior, Problem
 
 _WATCHED = 0.3  # share of a throw from which its release is fitted
-_FEWEST = 6  # samples in it
 _KNOWN = 1e-3  # deviation of a wind that other throws told [m/s]
 
 
@@ -59,7 +58,7 @@ def _stage(k: int, throws: int) -> str:
 def _miss(problem: Problem, x: FloatArray, k: int, progress: Progress | None) -> LeftOut:
     throw = problem.throws[k]
     path = next((o for o in throw.observations if isinstance(o, Positions | Camera)), None)
-    if path is None or len(path.t) * _WATCHED < _FEWEST:
+    if path is None or len(path.t) * _WATCHED < FEWEST:
         return LeftOut()
     rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
     stage = _stage(k, len(problem.throws))
@@ -77,7 +76,7 @@ def _miss(problem: Problem, x: FloatArray, k: int, progress: Progress | None) ->
         foot_deviation=_KNOWN,
     )
     end = float(path.t[-1]) * _WATCHED
-    watched = replace(throw, observations=tuple(_until(o, end) for o in throw.observations))
+    watched = throw.until(end)
     begun = replace(problem, throws=(watched,), free=(), held=held, prior=prior)
     fitted = solve(begun, np.concatenate([begun.means[: begun.shared], x[problem.own(k)]])).x
     whole = replace(begun, throws=(throw,))
@@ -93,14 +92,3 @@ def _last_miss(problem: Problem, path: Positions | Camera, x: FloatArray) -> flo
     place = problem.throws[0].observations.index(path)
     residuals = problem.predictions(0, x[np.newaxis])[place]
     return float(np.linalg.norm(residuals[0, -1, :2]))
-
-
-def _until(o: Observation, end: float) -> Observation:
-    """Return the measurements up to a time, at least some."""
-    n = max(int(np.searchsorted(o.t, end, side='right')), _FEWEST)
-    values = {
-        name: value[:n]
-        for name, value in vars(o).items()
-        if isinstance(value, np.ndarray) and len(value) == len(o.t)
-    }
-    return replace(o, **values)  # type: ignore[type-var]

@@ -22,8 +22,8 @@ _CORNER = 2.5  # standard deviations at which the loss of a residual turns from 
 _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
 _HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone
 _MOST_TRIES = 8  # of a step with more and more damping
-_KEPT = 3  # starts that are fitted, of those that are tried
-_MORE_KEPT = 12  # for a throw that fits worse than others
+KEPT = 3  # starts that are fitted, of those that are tried
+MORE_KEPT = 12  # for a throw that fits worse than others
 ALIKE = 2.0  # ratio of the mean losses of two throws above which one is in a wrong minimum
 _FIRST_STEPS = 8
 # Attitudes about the path to start from: angle of attack and roll [degrees].
@@ -83,7 +83,7 @@ def cost_of_throw(problem: Problem, k: int, here: FloatArray) -> float:
     return float(robust_loss(problem.residuals(k, here)).sum() + 0.5 * (prior**2).sum())
 
 
-def _each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
+def each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
     """Return the results for all throws, computed side by side."""
     n = len(problem.throws)
     with closing(Threads(most=n)) as pool:
@@ -91,7 +91,7 @@ def _each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Block:
+class Block:
     """The normal equations of one throw."""
 
     shared: FloatArray  # of the shared parameters, shape (s, s)
@@ -101,14 +101,15 @@ class _Block:
     own_gradient: FloatArray  # by the release, shape (12,)
 
 
-def _block(problem: Problem, k: int, x: FloatArray) -> _Block:
+def linear_block(problem: Problem, k: int, x: FloatArray) -> Block:
+    """Return the normal equations of throw `k` at all parameters, shape (p,)."""
     here = problem.here(k, x)
     r, slopes = problem.linearised(k, here)
     weighted = weights(r)[:, np.newaxis] * slopes
     normal, gradient = slopes.T @ weighted, weighted.T @ r
     n, root = problem.shared, problem.throws[k].information
     prior = problem.release_priors(k, here[n:])
-    return _Block(
+    return Block(
         normal[:n, :n],
         normal[:n, n:],
         normal[n:, n:] + root.T @ root,
@@ -194,7 +195,7 @@ def solve(
         keeper.offer(x, cost)
         if progress is not None:
             progress(stage, count, cost)
-        blocks = _each(problem, lambda k, x=x: _block(problem, k, x))  # type: ignore[misc]
+        blocks = each(problem, lambda k, x=x: linear_block(problem, k, x))  # type: ignore[misc]
         inverses = [np.linalg.inv(b.own) for b in blocks]
         prior = problem.shared_priors(x[:n]) / problem.shared_deviations
         normal = np.diag(1.0 / problem.shared_deviations**2)
@@ -204,11 +205,11 @@ def solve(
             gradient = gradient + b.gradient - b.mixed @ (inverse @ b.own_gradient)
         before = cost
         enough = _SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0)
-        whole = _within(x[:n], normal, gradient, 0.0, (low, high))
+        whole = step_within(x[:n], normal, gradient, 0.0, (low, high))
         if -float(whole @ gradient) / 2.0 < enough:
             break
         for _ in range(_MOST_TRIES):
-            step = _within(x[:n], normal, gradient, damping, (low, high))
+            step = step_within(x[:n], normal, gradient, damping, (low, high))
             tried = x.copy()
             tried[:n] += step
             for k, (b, inverse) in enumerate(zip(blocks, inverses, strict=True)):
@@ -227,7 +228,7 @@ def solve(
 def _released(problem: Problem, x: FloatArray) -> tuple[FloatArray, float]:
     """Return the parameters with all releases fitted, and the cost."""
     n = problem.shared
-    fitted = _each(problem, lambda k: fit_release(problem, k, problem.here(k, x)))
+    fitted = each(problem, lambda k: fit_release(problem, k, problem.here(k, x)))
     x = x.copy()
     for k, (here, _) in enumerate(fitted):
         x[problem.own(k)] = here[n:]
@@ -235,7 +236,7 @@ def _released(problem: Problem, x: FloatArray) -> tuple[FloatArray, float]:
     return x, float(sum(cost for _, cost in fitted) + 0.5 * (prior**2).sum())
 
 
-def _within(
+def step_within(
     x: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
@@ -285,7 +286,7 @@ def fitted_alone(problem: Problem, k: int) -> Alone:
     throw = problem.throws[k]
     alone = replace(problem, throws=(throw,), margin=ROUGH)
     fitted: list[tuple[float, int, Problem, FloatArray]] = []
-    for state in _promising(alone, 0, alone.means, starts(throw)):
+    for state in promising(alone, 0, alone.means, starts(throw)):
         around = replace(alone, throws=(throw.starting_at(state),))
         solution = solve(around, around.means, most_steps=_FIRST_STEPS)
         fitted.append((solution.cost, len(fitted), around, solution.x))
@@ -296,12 +297,18 @@ def fitted_alone(problem: Problem, k: int) -> Alone:
 
 
 def retry_releases(
-    problem: Problem, x: FloatArray, which: Sequence[int]
+    problem: Problem, x: FloatArray, which: Sequence[int], least_kept: int = KEPT
 ) -> tuple[Problem, FloatArray, bool]:
     """Fit releases again from many starts, with the shared parameters known better by now.
 
     A release has many local minima: the spin rate determines how often the disc wobbles until its
     landing, and each more or less of those is one.
+
+    Args:
+        problem: The problem.
+        x: Its parameters, shape (p,).
+        which: Numbers of the throws.
+        least_kept: Number of starts that are fitted; more of a throw that fits badly.
 
     Returns:
         The problem with changes counted from the best first states, the parameters there, and
@@ -320,8 +327,8 @@ def retry_releases(
         states, _, _ = problem.states_and_rows(k, here[np.newaxis])
         best = (throw, here, False)
         candidates = starts(throw) + _neighbours(states[0])
-        kept = _MORE_KEPT if losses[k] > ALIKE * min(losses) else _KEPT
-        for state in _promising(problem, k, here, candidates, kept):
+        kept = MORE_KEPT if losses[k] > ALIKE * min(losses) else least_kept
+        for state in promising(problem, k, here, candidates, kept):
             around = throw.starting_at(state)
             alone = replace(problem, throws=(around,))
             first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
@@ -330,7 +337,7 @@ def retry_releases(
                 best, cost = (around, fitted, True), fitted_cost
         return best
 
-    results = _each(problem, retried)
+    results = each(problem, retried)
     problem = replace(problem, throws=tuple(throw for throw, _, _ in results))
     x = x.copy()
     for k, (_, here, _) in enumerate(results):
@@ -338,12 +345,12 @@ def retry_releases(
     return problem, x, any(better for _, _, better in results)
 
 
-def _promising(
+def promising(
     problem: Problem,
     k: int,
     here: FloatArray,
     candidates: Sequence[FloatArray],
-    kept: int = _KEPT,
+    kept: int = KEPT,
 ) -> list[FloatArray]:
     """Return the first states of throw `k` that fit best as they are, the best first."""
     tried = np.tile(here, (len(candidates), 1))

@@ -1,25 +1,20 @@
 """From measured throws to the coefficients of a disc with standard errors: `identify`."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import coefficients, errors, information, marginal, profile
+from disc_sim_ros.estimation import coefficients, errors, information, marginal, profile, starting
 from disc_sim_ros.estimation.coefficients import NAMES, Base, base_of
 from disc_sim_ros.estimation.fitting import (
-    ALIKE,
     BETTER,
-    Alone,
     Best,
     Progress,
     Solution,
     fit_release,
-    fitted_alone,
     retry_releases,
     solve,
 )
@@ -33,11 +28,9 @@ from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.sampled import fly_sampled
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import COEFFICIENT_SPREAD
-from disc_sim_ros.threads import Threads
 
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
-_START_SPREAD = 0.5  # of the prior: how far other starts lie
-_START_STEPS = 12
+_STEPS_WITHOUT = 12  # of a fit without one of the throws
 _ROUNDS = 2  # of estimating the noise and fitting with it
 
 
@@ -193,16 +186,19 @@ def identify(
     interrupted = False
     left_out: list[Unidentifiable] = []
     try:
-        problem, x = _started(problem, progress)
+        search = starting.Search(starts, seed, progress)
+        problem, x = starting.started(problem, search)
         best = Best(x)
         rough = replace(problem, margin=ROUGH)
-        x = _from_starts(rough, x, _Search(starts, seed, best, progress)).x
+        x = starting.from_starts(rough, x, search, best).x
         given = set(noise or {})
         refuse_misfit(problem, estimated_noise(rough, x, given), given, HOPELESS)
         problem, x, left_out = _identifiable(problem, x, refuse=free is not None, anyway=anyway)
         best = Best(x)
         solution = solve(problem, x, best=best, progress=progress, stage='fit')
-        problem, x = _without_each(problem, solution, progress)
+        x = solution.x
+        if not problem.turns_only:  # a graduated search has left out each throw already
+            problem, x = _without_each(problem, solution, progress)
         best = Best(x)
         for number in range(_ROUNDS):
             estimated = estimated_noise(problem, x, given)
@@ -236,8 +232,7 @@ def identify(
 def stages(throws: int, starts: int) -> tuple[str, ...]:
     """Return the stages of an identification in their order, for a guess of the time left."""
     return (
-        'releases',
-        *(_start_stage(number, starts) for number in range(starts)),
+        *starting.stages(starts),
         'fit',
         *(_without_stage(k, throws) for k in range(throws if throws > 1 else 0)),
         'noise',
@@ -246,92 +241,9 @@ def stages(throws: int, starts: int) -> tuple[str, ...]:
     )
 
 
-def _start_stage(number: int, starts: int) -> str:
-    return f'start {number + 1} of {starts}'
-
-
 def _without_stage(k: int, throws: int) -> str:
     """Return the name of the stage that fits without throw `k`."""
     return f'without throw {k + 1} of {throws}'
-
-
-def _started(problem: Problem, progress: Progress | None) -> tuple[Problem, FloatArray]:
-    """Return the problem around the best start of each throw, and first parameters."""
-    done = 0
-
-    def start(k: int) -> Alone:
-        nonlocal done
-        result = fitted_alone(problem, k)
-        done += 1
-        if progress is not None:
-            progress('releases', done, float('nan'))
-        return result
-
-    with closing(Threads(most=len(problem.throws))) as pool:
-        fitted = pool.run((partial(start, k) for k in range(len(problem.throws))), leave=True)
-    problem = replace(problem, throws=tuple(alone.throw for alone in fitted))
-    x = problem.means.copy()
-    x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)
-    least = min(alone.loss for alone in fitted)
-    good = [alone for alone in fitted if alone.loss < ALIKE * least]
-    if len(good) == len(fitted) and not all(throw.turns_only for throw in problem.throws):
-        return problem, x
-    return _agreeing(problem, x, good)
-
-
-def _agreeing(
-    problem: Problem, x: FloatArray, good: Sequence[Alone]
-) -> tuple[Problem, FloatArray]:
-    """Return the problem and parameters of the throw that explains the others best.
-
-    Some throws alone end in a wrong local minimum: attitudes that nothing measured have many. With
-    the coefficients of a throw that fits, the releases of the others are found. With a gyro alone,
-    wrong minima fit nearly as well, and a search begins from the coefficients of each throw.
-    """
-    rough = replace(problem, margin=ROUGH)
-    n = problem.shared
-    ends: list[tuple[float, int, tuple[Throw, ...], FloatArray]] = []
-    for shared in (x[:n], *(alone.shared for alone in good)):
-        tried = problem.means.copy()
-        tried[:n] = shared
-        around, tried, _ = retry_releases(rough, tried, range(len(problem.throws)))
-        solution = solve(around, tried, most_steps=_START_STEPS)
-        ends.append((solution.cost, len(ends), around.throws, solution.x))
-    _, _, throws, best = min(ends, key=lambda entry: entry[:2])
-    return replace(problem, throws=throws), best
-
-
-@dataclass(frozen=True)
-class _Search:
-    """How to search from several sets of coefficients."""
-
-    starts: int
-    seed: int
-    best: Best
-    progress: Progress | None
-
-
-def _from_starts(problem: Problem, x: FloatArray, search: _Search) -> Solution:
-    """Return the best solution from several sets of coefficients."""
-    generator = np.random.default_rng(search.seed)
-    n = len(problem.free)
-    solutions = []
-    for number in range(search.starts):
-        start = x.copy()
-        if number:
-            step = _START_SPREAD * problem.shared_deviations[:n]
-            start[:n] = problem.means[:n] + step * generator.standard_normal(n)
-        solutions.append(
-            solve(
-                problem,
-                start,
-                most_steps=_START_STEPS,
-                best=search.best,
-                progress=search.progress,
-                stage=_start_stage(number, search.starts),
-            )
-        )
-    return min(solutions, key=lambda solution: solution.cost)
 
 
 def _without_each(
@@ -350,7 +262,7 @@ def _without_each(
         shared = solve(
             replace(rest, margin=ROUGH),
             np.delete(x, np.r_[problem.own(k)]),
-            most_steps=_START_STEPS,
+            most_steps=_STEPS_WITHOUT,
             progress=progress,
             stage=stage,
         ).x[: problem.shared]
@@ -360,7 +272,7 @@ def _without_each(
         other, tried, better = retry_releases(problem, tried, (k,))
         if not better:
             continue
-        again = solve(other, tried, most_steps=_START_STEPS, progress=progress, stage=stage)
+        again = solve(other, tried, most_steps=_STEPS_WITHOUT, progress=progress, stage=stage)
         if again.cost < cost - BETTER:
             problem, x, cost = other, again.x, again.cost
     return problem, x

@@ -10,6 +10,7 @@ from disc_sim_ros.estimation.coefficients import NAMES
 from disc_sim_ros.estimation.fitting import weights
 from disc_sim_ros.estimation.problem import Problem
 
+_BY_CHANCE = 3.0  # standard deviations of a correlation that white noise exceeds in 1 of 700 fits
 _CORRELATED = 0.3  # of neighbouring residuals, from which on standard errors are widened
 
 
@@ -85,13 +86,28 @@ def information(problem: Problem, x: FloatArray) -> Information:
     return Information(data, priors, _widening(problem, x))
 
 
-def _widening(problem: Problem, x: FloatArray) -> float:
-    """Return the factor by which correlated residuals widen standard errors.
+@dataclass(frozen=True)
+class Correlation:
+    """How residuals that follow each other in time are correlated.
 
-    Residuals with a correlation rho between neighbours tell as much as (1 - rho) / (1 + rho) of
-    their number that are independent (first-order autoregression).
+    Attributes:
+        rho: Mean correlation of all instruments and throws.
+        chance: Standard deviation of it for white noise.
     """
+
+    rho: float
+    chance: float
+
+    @property
+    def is_chance(self) -> bool:
+        """Return True if white noise gives as much in all but 1 of 700 fits."""
+        return self.rho < _BY_CHANCE * self.chance
+
+
+def correlation(problem: Problem, x: FloatArray) -> Correlation:
+    """Return the correlation of neighbouring residuals at the parameters `x`."""
     products = squares = 0.0
+    count = 0
     for k in range(len(problem.throws)):
         here = problem.here(k, x)[np.newaxis]
         throw = problem.throws[k]
@@ -99,7 +115,18 @@ def _widening(problem: Problem, x: FloatArray) -> float:
             whitened = np.clip(r[0] / problem.noise[o.kind], -3.0, 3.0)
             products += float((whitened[1:] * whitened[:-1]).sum())
             squares += float((whitened[1:] ** 2).sum())
+            count += whitened[1:].size
     rho = min(products / squares, 0.99) if squares > 0.0 else 0.0
+    return Correlation(rho, 1.0 / np.sqrt(max(count, 1)))
+
+
+def _widening(problem: Problem, x: FloatArray) -> float:
+    """Return the factor by which correlated residuals widen standard errors.
+
+    Residuals with a correlation rho between neighbours tell as much as (1 - rho) / (1 + rho) of
+    their number that are independent (first-order autoregression).
+    """
+    rho = correlation(problem, x).rho
     return float(np.sqrt((1.0 + rho) / (1.0 - rho))) if rho > _CORRELATED else 1.0
 
 

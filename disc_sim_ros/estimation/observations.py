@@ -4,7 +4,7 @@ Each class holds the measurements of one throw in the paper's axes and predicts 
 its sample times. `residuals` takes many flights at once.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +23,8 @@ POSITION, ATTITUDE, GYRO, ACCELERATION, CAMERA = (
 )
 UNITS = {POSITION: 'm', ATTITUDE: 'rad', GYRO: 'rad/s', ACCELERATION: 'm/s^2', CAMERA: 'm'}
 NOISE = {POSITION: 0.02, ATTITUDE: 0.035, GYRO: 0.02, ACCELERATION: 0.5, CAMERA: 0.3}
+
+FEWEST = 6  # samples that the beginning of a throw keeps
 
 
 class Observation(Protocol):
@@ -208,3 +210,14 @@ def _across(axis: FloatArray) -> FloatArray:
     one = np.cross(axis, e)
     one /= np.linalg.norm(one, axis=-1, keepdims=True)
     return np.stack([one, np.cross(axis, one)], axis=-2)
+
+
+def until(o: Observation, end: float) -> Observation:
+    """Return the measurements up to a time [s], at least FEWEST."""
+    n = max(int(np.searchsorted(o.t, end, side='right')), FEWEST)
+    values = {
+        name: value[:n]
+        for name, value in vars(o).items()
+        if isinstance(value, np.ndarray) and len(value) == len(o.t)
+    }
+    return replace(o, **values)  # type: ignore[type-var]

@@ -87,6 +87,11 @@ class Problem:
         return any(o.kind == CAMERA for throw in self.throws for o in throw.observations)
 
     @property
+    def turns_only(self) -> bool:
+        """Return True if of no throw more than the turning was measured."""
+        return all(throw.turns_only for throw in self.throws)
+
+    @property
     def shared(self) -> int:
         """Return the number of parameters that the throws share."""
         return len(self.free) + (4 if self.has_camera else 2)

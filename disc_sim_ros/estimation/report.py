@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from disc_sim_ros.estimation import coefficients
+from disc_sim_ros.estimation import coefficients, information
 from disc_sim_ros.estimation.coefficients import NAMES
 from disc_sim_ros.estimation.crossvalidation import LeftOut
 from disc_sim_ros.estimation.identification import Identification
@@ -56,6 +56,8 @@ def text(result: Identification, left_out: Sequence[LeftOut], system: System = M
             f'  residuals are correlated in time: something is not modelled; standard errors are '
             f'{result.widening:.1f} times those of white noise'
         )
+    else:
+        lines += _pattern(result)
     wider = [
         f'{problem.names[i]} {factor:.1f} times'
         for i, factor in enumerate(result.stretches)
@@ -76,13 +78,25 @@ def text(result: Identification, left_out: Sequence[LeftOut], system: System = M
             lines.append(line)
     for gauge in sorted({gauge for throw in problem.throws for gauge in throw.gauges}):
         lines.append(f'  {gauge}')
-    if all(throw.turns_only for throw in problem.throws):
+    if problem.turns_only:
         lines.append(
             '  a gyro alone: another solution may fit nearly as well, far outside the errors; '
             'measure a path, an attitude or a release too'
         )
     lines.append(f'  {verdict(result, left_out, system)}')
     return '\n'.join(lines)
+
+
+def _pattern(result: Identification) -> list[str]:
+    """Return a line about a correlation too weak to widen errors and too strong for chance."""
+    between = information.correlation(result.problem, result.x)
+    if between.is_chance:
+        return []
+    return [
+        f'  neighbouring residuals correlate by {between.rho:.2f}, white noise by '
+        f'{between.chance:.2f} at random: something is not modelled, or another solution fits '
+        'better than the one found'
+    ]
 
 
 def _strongest(result: Identification) -> str:

@@ -21,6 +21,7 @@ from disc_sim_ros.estimation.observations import (
     Gyro,
     Observation,
     Positions,
+    until,
 )
 from disc_sim_ros.estimation.releases import ReleaseErrors, release_covariance, release_state
 from disc_sim_ros.physics.disc import Disc
@@ -93,6 +94,10 @@ class Throw:
         start = np.asarray(start, dtype=float)
         delta, turn = local.difference(start, self.guess)
         return replace(self, start=start, believed=np.array([*delta, turn]))
+
+    def until(self, end: float) -> 'Throw':
+        """Return the throw with its measurements up to a time [s]."""
+        return replace(self, observations=tuple(until(o, end) for o in self.observations))
 
 
 def throw_of(

@@ -7,7 +7,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.coefficients import base_of, disc_with
+from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
 from disc_sim_ros.estimation.observations import (
     ACCELERATION,
     ATTITUDE,
@@ -22,12 +22,18 @@ from disc_sim_ros.estimation.observations import (
     Observation,
     Positions,
 )
+from disc_sim_ros.estimation.problem import Prior, Problem
 from disc_sim_ros.estimation.throws import Throw, throw_of
+from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.frames import flip_yz
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.sampled import default_row, fly_sampled
+from disc_sim_ros.quantities import COEFFICIENT_SPREAD, COEFFICIENTS
 
 CAMERA_HEIGHT = 100.0  # m
+SHARE = 0.3  # of the spread of discs: how far the true disc lies from the base, one deviation
+SPIN_ERROR = 3.0  # rad/s, of the spin that is stated where no gyro measures it
 
 
 def measured(
@@ -160,3 +166,49 @@ def thrown(
             spin = launch.spin + spin_error * generator.standard_normal()
         throws.append((throw_of(f'throw {k + 1}', made, disc, spin=spin), launch))
     return throws
+
+
+def drawn(
+    seed: int, base: Setup, kinds: Sequence[str], *, count: int
+) -> tuple[FloatArray, FloatArray, list[tuple[Throw, Launch]]]:
+    """Return a disc and a wind drawn at random, and throws with their true releases.
+
+    Args:
+        seed: Of all that is drawn.
+        base: The disc about which others are drawn.
+        kinds: The instruments.
+        count: Number of throws.
+
+    Returns:
+        Coefficients of the disc, shape (9,), the wind in `map` [m/s], shape (2,), and the throws.
+    """
+    generator = np.random.default_rng(seed)
+    values = _disc(generator, base)
+    wind = generator.normal(0.0, 2.0, 2)
+    setup = replace(base, step=5e-4, wind=Wind(mean=flip_yz((*wind, 0.0))))
+    error = None if GYRO in kinds else SPIN_ERROR
+    return values, wind, thrown(values, setup, kinds, generator, count=count, spin_error=error)
+
+
+def _disc(generator: np.random.Generator, base: Setup) -> FloatArray:
+    """Draw the coefficients of a disc."""
+    spread = np.array([COEFFICIENT_SPREAD[name] for name in NAMES])
+    values = base_of(base).values + SHARE * spread * generator.standard_normal(len(NAMES))
+    low = [COEFFICIENTS[name].lowest for name in NAMES]
+    high = [COEFFICIENTS[name].highest for name in NAMES]
+    low[NAMES.index('damping')] = 0.2  # a factor near 0 wobbles for ever
+    return np.clip(values, low, high)
+
+
+def problem_of(throws: Sequence[Throw], base: Setup) -> Problem:
+    """Return the problem that `identify` solves first."""
+    about = base_of(base)
+    return Problem(
+        setup=base,
+        base=about,
+        free=tuple(range(len(NAMES))),
+        throws=tuple(throws),
+        prior=Prior(np.array([COEFFICIENT_SPREAD[name] for name in NAMES])),
+        noise=NOISE,
+        held=about.values,
+    )

@@ -1,0 +1,153 @@
+"""Where an identification begins: the best of several starts, with their releases."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation import graduated
+from disc_sim_ros.estimation.fitting import (
+    ALIKE,
+    Alone,
+    Best,
+    Progress,
+    Solution,
+    fitted_alone,
+    retry_releases,
+    solve,
+)
+from disc_sim_ros.estimation.problem import ROUGH, Problem
+from disc_sim_ros.threads import Threads
+
+_SPREAD = 0.5  # of the prior: how far other starts lie
+_STEPS = 12
+_RELEASES = 'releases'
+
+
+@dataclass(frozen=True)
+class Search:
+    """How to search from several sets of coefficients.
+
+    Attributes:
+        starts: Number of sets.
+        seed: Of all but the first.
+        progress: Called with a stage, a count and the cost.
+    """
+
+    starts: int
+    seed: int
+    progress: Progress | None = None
+
+    def coefficients(self, problem: Problem, first: FloatArray) -> list[FloatArray]:
+        """Return the sets, each of shape (free,): the first, and some about the base disc."""
+        generator = np.random.default_rng(self.seed)
+        n = len(problem.free)
+        step = _SPREAD * problem.shared_deviations[:n]
+        others = range(1, self.starts)
+        return [first, *(problem.means[:n] + step * generator.standard_normal(n) for _ in others)]
+
+
+def stages(starts: int) -> tuple[str, ...]:
+    """Return the stages of a beginning in their order, for a guess of the time left."""
+    return (_RELEASES, *(_stage(number, starts) for number in range(starts)))
+
+
+def _stage(number: int, starts: int) -> str:
+    return f'start {number + 1} of {starts}'
+
+
+def started(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
+    """Return the problem around the best start of each throw, and first parameters."""
+    return (_graduated if problem.turns_only else fitted_apart)(problem, search)
+
+
+def fitted_apart(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
+    """Return the same of throws that are fitted one by one first."""
+    done = 0
+
+    def start(k: int) -> Alone:
+        nonlocal done
+        result = fitted_alone(problem, k)
+        done += 1
+        if search.progress is not None:
+            search.progress(_RELEASES, done, float('nan'))
+        return result
+
+    with closing(Threads(most=len(problem.throws))) as pool:
+        fitted = pool.run((partial(start, k) for k in range(len(problem.throws))), leave=True)
+    problem = replace(problem, throws=tuple(alone.throw for alone in fitted))
+    x = problem.means.copy()
+    x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)
+    least = min(alone.loss for alone in fitted)
+    good = [alone for alone in fitted if alone.loss < ALIKE * least]
+    return (problem, x) if len(good) == len(fitted) else _agreeing(problem, x, good)
+
+
+def _agreeing(
+    problem: Problem, x: FloatArray, good: Sequence[Alone]
+) -> tuple[Problem, FloatArray]:
+    """Return the problem and parameters of the throw that explains the others best.
+
+    Some throws alone end in a wrong local minimum: attitudes that nothing measured have many. With
+    the coefficients of a throw that fits, the releases of the others are found.
+    """
+    rough = replace(problem, margin=ROUGH)
+    n = problem.shared
+    ends: list[tuple[Solution, Problem]] = []
+    for shared in (x[:n], *(alone.shared for alone in good)):
+        tried = problem.means.copy()
+        tried[:n] = shared
+        around, tried, _ = retry_releases(rough, tried, range(len(problem.throws)))
+        solution = solve(around, tried, most_steps=_STEPS)
+        ends.append((solution, around))
+    best, around = min(ends, key=lambda end: end[0].cost)
+    return replace(problem, throws=around.throws), best.x
+
+
+def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
+    """Return the best end of graduated searches, see `graduated`."""
+    rough = replace(problem, margin=ROUGH)
+    n = len(problem.free)
+    ends: list[graduated.End] = []
+    for free in search.coefficients(problem, problem.means[:n]):
+        shared = problem.means[: problem.shared].copy()
+        shared[:n] = free
+        ends.append(graduated.search(rough, shared, search.progress, _RELEASES))
+    throws = len(problem.throws)
+    for k in range(throws if throws > 1 else 0):
+        shared = problem.means[: problem.shared]
+        ends.append(graduated.search_without(rough, shared, k, search.progress, _RELEASES))
+    end = min(ends, key=lambda e: e.cost)
+    return replace(problem, throws=end.problem.throws), end.x
+
+
+def from_starts(problem: Problem, x: FloatArray, search: Search, best: Best) -> Solution:
+    """Return the best solution from several sets of coefficients.
+
+    Args:
+        problem: The problem.
+        x: The first set with its releases, shape (p,).
+        search: The other sets; a graduated search has been there already.
+        best: Updated with each better point.
+    """
+    n = len(problem.free)
+    solutions = []
+    for number, free in enumerate(search.coefficients(problem, x[:n])):
+        if number and problem.turns_only:
+            break
+        start = np.concatenate([free, x[n:]])
+        stage = _stage(number, search.starts)
+        solutions.append(
+            solve(
+                problem,
+                start,
+                most_steps=_STEPS,
+                best=best,
+                progress=search.progress,
+                stage=stage,
+            )
+        )
+    return min(solutions, key=lambda solution: solution.cost)
