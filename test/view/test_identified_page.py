@@ -18,6 +18,7 @@ pytestmark = [
     pytest.mark.skipif(browser.program() is None, reason=browser.MISSING),
     pytest.mark.xdist_group('browser'),  # identified once
 ]
+NOISE = 2e-3  # m
 LAUNCH = Launch(speed=18.0, pitch=10.0, spin=60.0, height=1.3)
 
 
@@ -30,7 +31,8 @@ def trajectory():
 def file(trajectory, tmp_path_factory):
     folder = tmp_path_factory.mktemp('identified')
     measured = folder / 'one.csv'
-    rows = np.column_stack([trajectory.t, map_from_paper(trajectory.position)])
+    noise = np.random.default_rng(1).normal(0.0, NOISE, trajectory.position.shape)
+    rows = np.column_stack([trajectory.t, map_from_paper(trajectory.position) + noise])
     with measured.open('w', newline='') as text:
         csv.writer(text).writerows([['t_s', 'x_m', 'y_m', 'z_m'], *rows.tolist()])
     report = folder / 'report'
@@ -41,7 +43,7 @@ def file(trajectory, tmp_path_factory):
 
 @pytest.mark.parametrize('size', SIZES)
 def test_the_fitted_flight_flies_past_the_measured_points(file, trajectory, size, chromium):
-    """The positions have no noise, so the fit is within a centimetre of them."""
+    """The noise is far below a centimetre, so the fit is within one of the true positions."""
     places = map_from_paper(trajectory.position)
     with shown_at(chromium, size, file) as tab:
         for k in (10, 60):
