@@ -53,8 +53,15 @@ def phrases(text: str) -> list[str]:
     return [f'{text.count(chr(10), 0, m.start()) + 1}: {m[0]}' for m in PHRASES.finditer(text)]
 
 
+def words(text: str) -> set[str]:
+    """Return the words of a text: a source without a name in them needs no parser."""
+    return set(re.findall(r'\w+', text))
+
+
 def old_names_in_code(source: str) -> list[str]:
     """Return 'line: name' for each old name among the identifiers of a Python source."""
+    if not OLD_NAMES & words(source):
+        return []
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     names = [(t.start[0], t.string) for t in tokens if t.type == tokenize.NAME]
     return [f'{line}: {name}' for line, name in names if name in OLD_NAMES]
@@ -67,6 +74,8 @@ def old_names_in_prose(text: str) -> list[str]:
 
 def participles(source: str) -> list[str]:
     """Return 'line: name' for each variable and argument with a name of PARTICIPLES."""
+    if not PARTICIPLES & words(source):
+        return []
     nodes = list(ast.walk(ast.parse(source)))
     names = [(n.lineno, n.id) for n in nodes if isinstance(n, ast.Name)]
     names += [(n.lineno, n.arg) for n in nodes if isinstance(n, ast.arg)]

@@ -8,6 +8,7 @@ import ast
 from collections import Counter
 from collections.abc import Iterator
 import dataclasses
+from functools import cache
 import itertools
 import math
 import operator
@@ -19,6 +20,8 @@ import pytest
 from disc_sim_ros import topics
 from disc_sim_ros.quantities import QUANTITIES, VARIED
 from disc_sim_ros.topics import Frames
+
+pytestmark = pytest.mark.xdist_group('one home')  # each source is parsed once
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted(
@@ -75,25 +78,31 @@ def number(node: ast.expr) -> float | None:
     return None
 
 
-def texts(tree: ast.Module) -> Iterator[ast.Constant]:
+@cache
+def nodes_of(source: str) -> list[ast.AST]:
+    """Return all nodes of a module."""
+    return list(ast.walk(ast.parse(source)))
+
+
+def texts(nodes: list[ast.AST]) -> Iterator[ast.Constant]:
     """Yield every text of a module that is not a docstring."""
     docs = {
         node.body[0].value
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
         and node.body
         and isinstance(node.body[0], ast.Expr)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in docs:
             yield node
 
 
 def ranges_in(source: str) -> list[tuple[float, float]]:
     """Return the ranges of the table that are written as two neighbouring numbers or in a text."""
-    tree = ast.parse(source)
+    nodes = nodes_of(source)
     repeated = []
-    for node in ast.walk(tree):
+    for node in nodes:
         match node:
             case ast.Tuple() | ast.List():
                 values = node.elts
@@ -105,7 +114,7 @@ def ranges_in(source: str) -> list[tuple[float, float]]:
                 continue
         numbers = [number(value) for value in values]
         repeated += [pair for pair in itertools.pairwise(numbers) if pair in RANGES]
-    for node in texts(tree):
+    for node in texts(nodes):
         for low, high in re.findall(r'(-?\d[\d.e+-]*) (?:to|and) (-?\d[\d.e+]*)', node.value):
             try:
                 pair = float(low), float(high.rstrip('.'))
@@ -117,10 +126,10 @@ def ranges_in(source: str) -> list[tuple[float, float]]:
 
 def names_in(source: str) -> list[str]:
     """Return the topics and frames that a module names in a text of its own."""
-    tree = ast.parse(source)
+    nodes = nodes_of(source)
     names = (TOPICS | FRAMES) - WORDS | {f'/{name}' for name in TOPICS}
-    repeated = [node.value for node in texts(tree) if node.value in names]
-    for node in ast.walk(tree):
+    repeated = [node.value for node in texts(nodes) if node.value in names]
+    for node in nodes:
         match node:
             case ast.Call(func=ast.Name(id=called) | ast.Attribute(attr=called)):
                 named = list(node.args) if TAKES_TOPIC.fullmatch(called) else []
@@ -139,7 +148,7 @@ def patterns_in(source: str) -> list[str]:
     """Return the regular expressions that a module compiles or matches."""
     return [
         node.args[0].value
-        for node in ast.walk(ast.parse(source))
+        for node in nodes_of(source)
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Attribute)
         and isinstance(node.func.value, ast.Name)
