@@ -36,9 +36,9 @@ def measure() -> None:
 
     llvm = [0.0]
     timed(codegen.CPUCodeLibrary, '_optimize_functions', llvm)
-    timed(codegen.CPUCodeLibrary, '_optimize_final_module', llvm)
-    timed(codegen.JITCodeLibrary, '_finalize_specific', llvm)
+    timed(codegen.JITCodeLibrary, '_optimize_final_module', llvm)
     timed(binding.ModuleRef, 'link_in', llvm)
+    timed(binding.TargetMachine, 'emit_object', llvm)
     compile_entry = compiler.compile_entry
 
     def compile_and_print(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

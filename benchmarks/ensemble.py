@@ -113,7 +113,10 @@ def lines(largest: float = 1e6) -> tuple[Line, ...]:
           )  # fmt: skip
     cpp = cpp_rate(setup)
     if cpp is not None:
-        print(f'plain C++ at {step * 1e3:g} ms: {cpp[0]:.0f} flights/CPU-s, fly_many {cpp[1]:.0f}')
+        print(f'plain C++ at {step * 1e3:g} ms: {cpp[0]:.0f} flights/CPU-s, '
+              f'fly_many {cpp[1]:.0f}, without checks, releases and ends, '
+              f'which cost {1e6 * cpp[2]:.2f} us a flight, '
+              f'{1.0 / (1.0 / cpp[1] - cpp[2]):.0f}')  # fmt: skip
     print(f' flights        s   flights/s   peak memory, MB   (in batches of {BATCH})')
     count = 1000
     while count <= largest:
@@ -208,8 +211,11 @@ def rates(setup: Setup, count: int) -> tuple[float, float]:
     return count / cpu, count / wall
 
 
-def cpp_rate(setup: Setup) -> tuple[float, float] | None:
+def cpp_rate(setup: Setup) -> tuple[float, float, float] | None:
     """Return flights per CPU-second of the C++ program and of `fly_many`; None without g++.
+
+    The third is the CPU time of a flight of `fly_many` without a whole step [s]: it checks
+    numbers, and computes states at release and ends. The C++ program starts from states.
 
     Raises:
         AssertionError: They do not land at the same points.
@@ -221,7 +227,7 @@ def cpp_rate(setup: Setup) -> tuple[float, float] | None:
     states = np.array(
         [Launch(**dict(zip(thrown, map(float, row), strict=True))).state() for row in rows]
     )
-    theirs = ours = math.inf
+    theirs = ours = around = math.inf
     with tempfile.TemporaryDirectory() as folder:
         program = Ensemble(Path(folder), setup)
         for _ in range(ROUNDS):
@@ -231,10 +237,13 @@ def cpp_rate(setup: Setup) -> tuple[float, float] | None:
             start = time.process_time()
             landings = fly_many(thrown, setup, threads=1)
             ours = min(ours, time.process_time() - start)
+            start = time.process_time()
+            fly_many(thrown, setup, threads=1, ground=False, duration=1e-9)
+            around = min(around, time.process_time() - start)
     apart = max(abs(landings.x - ends[:, 0]).max(), abs(landings.y + ends[:, 1]).max())
     if not apart <= SAME:
         raise AssertionError(f'fly_many and the C++ program land {apart:.3g} m apart')
-    return COUNT / theirs, COUNT / ours
+    return COUNT / theirs, COUNT / ours, around / COUNT
 
 
 def numpy_rate(setup: Setup, references: list[list[float]]) -> tuple[float, float]:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 
@@ -109,6 +110,23 @@ def test_what_a_call_changes_in_an_array_the_next_call_sees(kernel):
     assert kernel(outer_of(table[:1]), 2.0, results).total == 24.5
     assert kernel(outer, 2.0, np.zeros(1)).total == 28.5
     assert results[0] == 24.0  # the last call wrote to another array
+
+
+def test_numba_itself_compiles_and_calls_other_functions_meanwhile_and_after(kernel):
+    """Entries are compiled without being loaded into numba; other functions must be."""
+    plain = [numba.njit(eval(f'lambda x: x + {i}.0')) for i in range(8)]
+    calling = numba.njit(lambda outer, factor, results: kernel(outer, factor, results).total)
+    tables = [TABLE.astype(kind) for kind in ('i1', 'i2', 'u1', 'u2', 'u4', 'f4')]
+    with ThreadPoolExecutor(2) as pool:
+        sums = pool.map(lambda f: f(0.5), plain)
+        totals = pool.map(lambda t: kernel(outer_of(t), 2.0, np.zeros(1)).total, tables)
+        assert list(sums) == [i + 0.5 for i in range(8)]
+        assert list(totals) == [add(outer_of(TABLE), 2.0, np.zeros(1)).total] * len(tables)
+    results = np.zeros(1)
+    for table in (TABLE, TABLE.astype('i1')):
+        expected = add(outer_of(table), 2.0, np.zeros(1)).total
+        assert calling(outer_of(table), 2.0, results) == expected
+    assert results[0] == 2.0 * TABLE.sum()
 
 
 def test_threads_do_not_share_arguments(kernel):

@@ -12,7 +12,8 @@ from typing import Any
 from llvmlite import binding, ir  # type: ignore[import-untyped]
 import numba
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, codegen
+from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable, typeof_impl
 from numba.np import arrayobj, numpy_support
 
@@ -34,7 +35,7 @@ def learn() -> None:
     while _learned < len(jit.MARKED):
         mark = jit.MARKED[_learned]
         _learned += 1
-        options = {'forceinline': True, **_OPTIONS} if mark.inline else _OPTIONS
+        options = {**_OPTIONS, **_WITHOUT_PYTHON, 'forceinline': mark.inline}
         if mark.otherwise is None:
             register_jitable(**options)(mark.function)
         else:
@@ -70,11 +71,12 @@ def compile_entry(
     learn()
     dispatcher = _dispatcher(function)
     kinds = tuple(map(numba.typeof, arguments))
-    with _without_garbage_collection():
+    with _without_garbage_collection(), _without_loading():
         dispatcher.compile(kinds)
     compiled = dispatcher.overloads[kinds]
     library = compiled.library
-    _, _, (code, _) = library.serialize_using_object_code()
+    library._optimize_final_module()  # noqa: SLF001 - as `finalize` does
+    code = bytes(library.codegen._tm.emit_object(library._final_module))  # noqa: SLF001
     symbol = f'call.{compiled.fndesc.llvm_func_name}'
     needs = [
         function.name
@@ -100,6 +102,30 @@ def _without_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
+@contextmanager
+def _without_loading() -> Iterator[None]:
+    """Let numba translate functions to LLVM's code, and neither optimise nor load them.
+
+    It would do so with each of dozens of functions that go into one entry, and with the entry
+    again: a fifth of the time. Other threads wait, as they do while numba compiles.
+    """
+    replaced = [
+        (codegen.JITCodeLibrary, '_optimize_final_module'),
+        (codegen.JITCodeLibrary, '_finalize_specific'),
+        (codegen.JITCPUCodegen, '_add_module'),
+        (codegen.JITCPUCodegen, 'set_env'),
+    ]
+    with global_compiler_lock:
+        methods = [getattr(cls, name) for cls, name in replaced]
+        for cls, name in replaced:
+            setattr(cls, name, lambda *_: None)
+        try:
+            yield
+        finally:
+            for (cls, name), method in zip(replaced, methods, strict=True):
+                setattr(cls, name, method)
+
+
 def in_memory(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function as numba itself compiles and calls it, without `machine_code`."""
     learn()
@@ -119,8 +145,8 @@ def _result_kind(kind: Any) -> Any:
 
 def _caller(symbol: str, compiled: Any, context: Any, kinds: tuple[Any, ...]) -> bytes:
     """Return the object file of an int32 function that takes the address of the arguments."""
-    codegen = compiled.library.codegen
-    module = codegen._create_empty_module(symbol)  # noqa: SLF001 - with the target of the library
+    target = compiled.library.codegen
+    module = target._create_empty_module(symbol)  # noqa: SLF001 - with the target of the library
     function = ir.Function(module, ir.FunctionType(_I32, [_I64.as_pointer()]), symbol)
     builder = ir.IRBuilder(function.append_basic_block())
     memory = _Memory(context, builder, function.args[0])
@@ -131,7 +157,7 @@ def _caller(symbol: str, compiled: Any, context: Any, kinds: tuple[Any, ...]) ->
     memory.store(result_type, result)
     builder.ret(status.code)
     parsed = binding.parse_assembly(cgutils.normalize_ir_text(str(module)))
-    return bytes(codegen._tm.emit_object(parsed))  # noqa: SLF001 - the target machine
+    return bytes(target._tm.emit_object(parsed))  # noqa: SLF001 - the target machine
 
 
 class _Memory:
