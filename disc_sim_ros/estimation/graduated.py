@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.coefficients import NAMES
 from disc_sim_ros.estimation.fitting import (
     BETTER,
     KEPT,
@@ -30,8 +31,13 @@ from disc_sim_ros.estimation.fitting import (
 )
 from disc_sim_ros.estimation.problem import Problem
 from disc_sim_ros.estimation.throws import RELEASE_SIZE
+from disc_sim_ros.quantities import COEFFICIENTS
 
 _FACTORS = (100.0, 30.0, 10.0, 5.0, 3.0, 2.0)  # on the noise, before the noise itself
+_TRUSTED = 3.0  # factor down to which beliefs may be drawn
+# How far drawn beliefs lie from those of the problem, in its standard deviations, and how many of
+# the parameters of a release keep theirs, because the gyro measures them.
+_COEFFICIENT_SPREAD, _RELEASE_SPREAD, _TURNING = 1.0, 0.5, 4
 _ENOUGH = 0.1  # decrease of the cost that ends the search with one factor, in half squares
 _ENOUGH_AT_LAST = 1e-2
 _STEPS, _LAST_STEPS = 15, 40
@@ -64,6 +70,7 @@ def search(
     shared: FloatArray,
     progress: Progress | None = None,
     stage: str = '',
+    drawn: np.random.Generator | None = None,
 ) -> End:
     """Return what a graduated search finds from shared parameters and the best of many releases.
 
@@ -72,6 +79,8 @@ def search(
         shared: First shared parameters, shape (shared,).
         progress: Called with the stage, a count and the cost.
         stage: For `progress`.
+        drawn: Draws other beliefs, which the search heeds while the noise is large; None for
+            those of the problem. From other shared parameters it comes to the same end.
     """
     first = problem.means.copy()
     first[: problem.shared] = np.clip(shared, *problem.bounds)
@@ -82,11 +91,12 @@ def search(
         throws.append(throw.starting_at(state))
     around = replace(problem, throws=tuple(throws))
     first[problem.shared :] = 0.0
+    others = around if drawn is None else _with_other_beliefs(around, drawn)
     x, cost = first, np.inf
     for count, factor in enumerate((*_FACTORS, 1.0)):
         last = factor == 1.0
         x, cost = _joint(
-            _with_noise(around, factor),
+            _with_noise(others if factor > _TRUSTED else around, factor),
             x,
             _LAST_STEPS if last else _STEPS,
             _ENOUGH_AT_LAST if last else _ENOUGH,
@@ -138,6 +148,21 @@ def _with_other_releases(result: End, which: Sequence[int], kept: int = KEPT) ->
     if not better:
         return None
     return End(around, *_joint(around, x, _LAST_STEPS, _ENOUGH_AT_LAST))
+
+
+def _with_other_beliefs(problem: Problem, generator: np.random.Generator) -> Problem:
+    """Return the problem with means of coefficients and releases that are drawn."""
+    values = problem.base.values
+    bounds = np.array([(COEFFICIENTS[n].lowest, COEFFICIENTS[n].highest) for n in NAMES]).T
+    step = problem.prior.coefficients * generator.standard_normal(len(values))
+    moved = np.clip(values + _COEFFICIENT_SPREAD * step, *bounds) - values
+    throws = []
+    for throw in problem.throws:
+        away = np.linalg.solve(throw.information, generator.standard_normal(RELEASE_SIZE))
+        away[-_TURNING:] = 0.0
+        throws.append(replace(throw, believed=throw.believed + _RELEASE_SPREAD * away))
+    prior = replace(problem.prior, moved=moved)
+    return replace(problem, throws=tuple(throws), prior=prior)
 
 
 def _with_noise(problem: Problem, factor: float) -> Problem:

@@ -36,11 +36,12 @@ class Prior:
 
     Attributes:
         coefficients: Standard deviations in the order of `coefficients.NAMES`, shape (9,); the
-            means are those of the base disc.
+            means are those of the base disc and `moved`.
         wind: Mean wind x, y in `map` [m/s].
         wind_deviation: Its standard deviation [m/s].
         foot: Point under the camera, x and y in `map` [m].
         foot_deviation: Its standard deviation [m].
+        moved: What is added to the coefficients of the base disc, shape (9,); None for nothing.
     """
 
     coefficients: FloatArray
@@ -48,6 +49,7 @@ class Prior:
     wind_deviation: float = 3.0
     foot: tuple[float, float] = (0.0, 0.0)
     foot_deviation: float = 5.0
+    moved: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,9 @@ class Problem:
     def means(self) -> FloatArray:
         """Return the parameters before the throws, shape (p,)."""
         camera = self.prior.foot if self.has_camera else ()
-        shared = [*self.base.values[list(self.free)], *self.prior.wind, *camera]
+        moved = 0.0 if self.prior.moved is None else self.prior.moved
+        values = (self.base.values + moved)[list(self.free)]
+        shared = [*values, *self.prior.wind, *camera]
         return np.concatenate([shared, np.zeros(self.size - len(shared))])
 
     @cached_property

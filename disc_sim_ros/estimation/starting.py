@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import graduated
+from disc_sim_ros.estimation import graduated, information
 from disc_sim_ros.estimation.fitting import (
     ALIKE,
     Alone,
@@ -24,6 +24,7 @@ from disc_sim_ros.threads import Threads
 
 _SPREAD = 0.5  # of the prior: how far other starts lie
 _STEPS = 12
+DRAWN = 12  # graduated searches with drawn beliefs, while residuals are not white
 _RELEASES = 'releases'
 
 
@@ -108,7 +109,10 @@ def _agreeing(
 
 
 def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
-    """Return the best end of graduated searches, see `graduated`."""
+    """Return the best end of graduated searches, see `graduated`.
+
+    In a wrong minimum neighbouring residuals are usually correlated. Then more searches follow.
+    """
     rough = replace(problem, margin=ROUGH)
     n = len(problem.free)
     ends: list[graduated.End] = []
@@ -121,6 +125,13 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
         shared = problem.means[: problem.shared]
         ends.append(graduated.search_without(rough, shared, k, search.progress, _RELEASES))
     end = min(ends, key=lambda e: e.cost)
+    generator = np.random.default_rng(search.seed)
+    for _ in range(DRAWN):
+        if information.correlation(end.problem, end.x).is_chance:
+            break
+        shared = problem.means[: problem.shared]
+        other = graduated.search(rough, shared, search.progress, _RELEASES, generator)
+        end = min(end, other, key=lambda e: e.cost)
     return replace(problem, throws=end.problem.throws), end.x
 
 

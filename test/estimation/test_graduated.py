@@ -12,6 +12,7 @@ from disc_sim_ros.estimation.identification import Identification
 from disc_sim_ros.estimation.information import correlation
 from disc_sim_ros.estimation.observations import GYRO
 from disc_sim_ros.estimation.problem import FINEST, ROUGH, Problem
+from disc_sim_ros.estimation.starting import DRAWN
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from estimation.synthetic_sessions import drawn, problem_of
@@ -48,6 +49,17 @@ def test_a_throw_that_bends_the_others_is_found_from_them():
     problem, around, true = session(501)
     result = graduated.search_without(problem, problem.means[: problem.shared], 3)
     assert result.cost < solve(around, true).cost + NEAR
+
+
+@pytest.mark.slow
+def test_drawn_beliefs_find_what_those_of_the_problem_do_not():
+    """In session 400 the search ends 160 above, and so does one without any of the throws."""
+    problem, around, true = session(400)
+    enough = solve(around, true).cost + NEAR
+    generator = np.random.default_rng(0)
+    shared = problem.means[: problem.shared]
+    ends = (graduated.search(problem, shared, drawn=generator) for _ in range(DRAWN))
+    assert any(end.cost < enough for end in ends)
 
 
 def test_correlated_residuals_are_no_chance_and_reported():
