@@ -235,7 +235,8 @@ def test_a_bag_of_the_simulator_gives_its_disc_back(tmp_path, capsys):
     pytest.importorskip('rclpy')
     bag = tmp_path / 'bag'
     throw = ['--disc', 'ultrastar', '--speed', '17', '--height', '1.2', '--spin', '60']
-    assert fly.main([*throw, '--roll-rate', '1', '--bag', str(bag)]) == 0
+    throw += ['--roll-rate', '1', '--duration', '1.2']
+    assert fly.main([*throw, '--bag', str(bag)]) == 0
     capsys.readouterr()
     words = [str(bag), '--disc', 'ultrastar', '--free', 'C_D0,damping', '--starts', '1', '--json']
     assert identify.main(words) == 0
