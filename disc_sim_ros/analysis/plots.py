@@ -40,7 +40,6 @@ _INPUT_LABELS = {
 }
 _STYLES = ('-', '--', ':')
 _LEGEND_LIMIT = 8  # flights in a legend, at most
-_DPI = 120
 
 
 def flight_figure(flight: 'Flight', system: System = METRIC) -> Figure:
@@ -211,18 +210,18 @@ def _inputs(a: 'Analysis', topic: str) -> 'list[Change]':
     ]
 
 
-def image(figure: Figure, kind: str) -> bytes:
+def image(figure: Figure, kind: str, dpi: int = 120) -> bytes:
     """Return a figure as the bytes of a file of the `kind` 'png', 'svg' or 'pdf'."""
     buffer = BytesIO()
     with warnings.catch_warnings():
         # A disc name in a script that the font lacks is drawn as boxes, without a warning.
         warnings.filterwarnings('ignore', message='Glyph .* missing from font')
         if kind == 'png':  # `savefig` would draw it twice, first for the layout alone
-            figure.set_dpi(_DPI)
+            figure.set_dpi(dpi)
             canvas = FigureCanvasAgg(figure)
             canvas.draw()  # type: ignore[no-untyped-call]
             pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-            Image.fromarray(pixels).save(buffer, format='png', dpi=(_DPI, _DPI))
+            Image.fromarray(pixels).save(buffer, format='png', dpi=(dpi, dpi))
         else:
             figure.savefig(buffer, format=kind)
     return buffer.getvalue()

@@ -5,7 +5,6 @@ import base64
 from collections.abc import Sequence
 from datetime import UTC, datetime
 import html
-import io
 import json
 from pathlib import Path
 import shlex
@@ -94,7 +93,7 @@ def _page_of_throws(result: 'Identification', system: System) -> bytes:
 
 
 def _picture(figure: 'Figure') -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format='png', dpi=110)
-    data = base64.b64encode(buffer.getvalue()).decode()
+    from disc_sim_ros.analysis.plots import image  # noqa: PLC0415 - matplotlib is slow
+
+    data = base64.b64encode(image(figure, 'png', dpi=110)).decode()
     return f'<p><img alt="plot" src="data:image/png;base64,{data}"></p>'
