@@ -29,7 +29,7 @@ from disc_sim_ros.estimation.fitting import (
     starts,
     step_within,
 )
-from disc_sim_ros.estimation.problem import Problem
+from disc_sim_ros.estimation.problem import FINE, Problem
 from disc_sim_ros.estimation.throws import RELEASE_SIZE
 from disc_sim_ros.quantities import COEFFICIENTS
 
@@ -140,6 +140,12 @@ def search_without(
     )
     whole = End(replace(problem, throws=tuple(throws)), x, np.inf)
     return _with_other_releases(whole, (k,), MORE_KEPT) or whole
+
+
+def refined(end: End) -> End:
+    """Return an end fitted in finer steps: rough ones leave a pattern in the residuals."""
+    problem = replace(end.problem, margin=FINE)
+    return End(problem, *_joint(problem, end.x, _STEPS, _ENOUGH_AT_LAST))
 
 
 def _with_other_releases(result: End, which: Sequence[int], kept: int = KEPT) -> End | None:

@@ -127,7 +127,8 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
     end = min(ends, key=lambda e: e.cost)
     generator = np.random.default_rng(search.seed)
     for _ in range(DRAWN):
-        if information.correlation(end.problem, end.x).is_chance:
+        fine = graduated.refined(end)
+        if information.correlation(fine.problem, fine.x).is_chance:
             break
         shared = problem.means[: problem.shared]
         other = graduated.search(rough, shared, search.progress, _RELEASES, generator)

@@ -62,6 +62,16 @@ def test_drawn_beliefs_find_what_those_of_the_problem_do_not():
     assert any(end.cost < enough for end in ends)
 
 
+def test_rough_steps_leave_a_pattern_that_is_no_wrong_minimum():
+    """In session 300 they correlate residuals at the truth by 4 standard deviations of chance."""
+    _, around, true = session(300)
+    solution = solve(around, true)
+    end = graduated.End(around, solution.x, solution.cost)
+    assert not correlation(end.problem, end.x).is_chance  # or this session no longer shows it
+    fine = graduated.refined(end)
+    assert correlation(fine.problem, fine.x).is_chance
+
+
 def test_correlated_residuals_are_no_chance_and_reported():
     _, around, true = session(309)
     around = replace(around, margin=FINEST)  # coarse steps leave a pattern of their own
