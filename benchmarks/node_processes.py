@@ -146,6 +146,11 @@ class Watch(Node):
         while not self._values and time.monotonic() < until:
             rclpy.spin_once(self, timeout_sec=0.1)
 
+    @property
+    def worst(self) -> float:
+        """Return the greatest lateness that was reported [s]."""
+        return max(float(row['worst_lateness_s']) for row in self._values)
+
     def medians(self) -> tuple[float, float, float]:
         """Return medians of real-time factor, lateness p50 and p99 [s]; zeros of a naive node."""
         rows = self._values[1:] or self._values

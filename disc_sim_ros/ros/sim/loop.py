@@ -322,7 +322,8 @@ class SimLoop(threading.Thread):
         if self.pacer.slips > slips:
             jumped = self._follow_wall('slip', steps)
             self._warn(
-                'the machine stalled the simulation, which does not make up for it; '
+                'the machine or the middleware stalled the simulation, which does not make up '
+                'for it; '
                 + ('stamps jump to the wall clock; ' if jumped else '')
                 + f'{self.pacer.slipped:.3f} s behind the wall clock in all',
                 'slip',
