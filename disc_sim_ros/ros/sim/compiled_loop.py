@@ -35,7 +35,7 @@ LONGEST_SLEEP = 0.01  # s
 LONGEST_QUANTUM = 1e-3  # s of simulated time between two polls of the command topics, at a pace
 UNWATCHED_QUANTUM = 5e-3  # s, the same while no publisher of commands and no clock is matched
 MOST_STEPS = 1000  # of one call
-LONGEST_CALL = 0.1  # s of wall time; other threads see lateness and counts that late
+LONGEST_CALL = 0.2  # s of wall time; other threads see lateness and counts that late
 _REST = False
 _LARGEST = 2**62  # of the numbers from which a stamp is computed
 
@@ -107,8 +107,10 @@ class CompiledLoop:
         self._before = np.zeros(INTEGRATOR_STATE_SIZE)
         self._time = np.zeros(2, dtype=np.int64)
         self._number = np.zeros(1, dtype=np.int64)
-        self._result = np.zeros(3, dtype=np.int64)
+        self._result = np.zeros(4, dtype=np.int64)
         self._late = np.zeros(MOST_STEPS)
+        self._points = np.zeros((MOST_STEPS, tick.POSE_SIZE))
+        self._point_stamps = np.zeros(MOST_STEPS, dtype=np.int64)
         self._functions = tick_inbox.Functions(**native.functions)
 
     def interrupt(self) -> None:
@@ -197,7 +199,9 @@ class CompiledLoop:
                 most,
                 _whole(sim.commands.next_change()),
                 _whole(sim.next_throw),
+                sim.steps_to_path if out.path.has_subscribers else 0,
                 sim.steps_to_path,
+                0 if out.path.has_subscribers else sim.steps_per_point,
             ),
             tick.Shared(
                 self._attention,
@@ -207,10 +211,17 @@ class CompiledLoop:
                 self._number,
                 self._number.ctypes.data,
                 self._late,
+                self._points,
+                self._point_stamps,
                 self._result,
             ),
         )
-        steps, deadlines, _ = self._result.tolist()
+        steps, deadlines, _, points = self._result.tolist()
+        poses = zip(
+            self._point_stamps[:points].tolist(), self._points[:points].tolist(), strict=True
+        )
+        for stamp, pose in poses:
+            out.keep_point(stamp, pose)
         pacer.add(steps, self._late[:deadlines].tolist())
         moment_until, coefficients_until = map(_stamp, self._until.tolist())
         control.restore(_control(self._active), moment_until, coefficients_until)
@@ -332,8 +343,10 @@ def warm_up() -> None:
             _REST, 1, floats, Velocity(0.0, 0.0, 0.0), floats, floats, *constants, floats, floats
         ),
         tick.Time(0, 0, 1, 1, 0, 1, 0.0, 1.0, 0, 1, 1, LONGEST_SLEEP, CATCH_UP),
-        tick.Limits(0, 0, 0, 0),
-        tick.Shared(whole, whole, whole, 0, whole, 0, floats, np.zeros(3, dtype=np.int64)),
+        tick.Limits(0, 0, 0, 0, 0, 0),
+        tick.Shared(
+            whole, whole, whole, 0, whole, 0, floats, table, whole, np.zeros(4, dtype=np.int64)
+        ),
     )
 
 

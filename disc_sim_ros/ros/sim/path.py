@@ -1,11 +1,11 @@
 """The message of `path`, whose points are serialised once each."""
 
+from collections.abc import Sequence
 import struct
 
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 
-from disc_sim_ros.physics.frames import Pose
 from disc_sim_ros.ros import messages
 from disc_sim_ros.ros.cdr_template import CdrTemplate
 
@@ -50,7 +50,7 @@ class PathBytes:
         """Remove all points."""
         self._points = bytearray()
 
-    def extend(self, seconds: int, nanoseconds: int, pose: Pose) -> None:
+    def extend(self, seconds: int, nanoseconds: int, pose: Sequence[float]) -> None:
         """Add a point, with its stamp, and remove the oldest if there are too many."""
         self._points += self._other.pack(seconds, nanoseconds, self._name, *pose)
         del self._points[: -self._most * self._other.size]

@@ -168,9 +168,13 @@ class Publishers:
 
     def extend_path(self, nanoseconds: int, s: State) -> None:
         """Add the present pose to the path, and publish it if it has subscribers."""
-        self._path.extend(*stamp(nanoseconds), messages.pose(s))
+        self.keep_point(nanoseconds, messages.pose(s))
         if self.path.has_subscribers:
             self.path.publish(self._path.message())
+
+    def keep_point(self, nanoseconds: int, pose: Sequence[float]) -> None:
+        """Add a pose to the path: position and quaternion x, y, z, w."""
+        self._path.extend(*stamp(nanoseconds), pose)
 
     def publish_release(
         self, nanoseconds: int, s: State, configuration: str, diameter: float

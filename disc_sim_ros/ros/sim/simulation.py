@@ -145,6 +145,11 @@ class Simulation:
         return steps + -number % every * self.config.steps_per_publish
 
     @property
+    def steps_per_point(self) -> int:
+        """Return the steps from point to point of the path; 0 if none is added."""
+        return self._messages_per_point * self.config.steps_per_publish
+
+    @property
     def _messages_per_point(self) -> int:
         """Return the messages from point to point of the path, or 0."""
         rate = self.config.path_rate

@@ -41,6 +41,7 @@ NEVER = 2**62  # ns
 APPLIED_COEFFICIENTS, APPLIED_MOMENT = 0, 1  # messages: that, one for each of `axes`, then states
 FIRST_STATE = APPLIED_MOMENT + 3
 MOTION, SPIN, JOINT, QUANTITIES, IMU, WRENCH, VALUES = 0, 13, 15, 17, 22, 28, 34  # in `values`
+POSE_SIZE = 7  # position and quaternion, the first numbers of a motion
 _MONOTONIC, _ABSOLUTE = 1, 1  # CLOCK_MONOTONIC, TIMER_ABSTIME of Linux
 
 
@@ -114,6 +115,8 @@ class Limits(NamedTuple):
     change: int  # stamp from which a step is Python's [ns]
     throw_at: int  # stamp from which a message is Python's [ns]
     python_step: int  # number of the step whose message is Python's
+    point_step: int  # number of the step whose pose is the first to be kept for the path
+    point_every: int  # steps from one such pose to the next; 0: none is kept
 
 
 class Shared(NamedTuple):
@@ -126,7 +129,11 @@ class Shared(NamedTuple):
     number: Ints  # shape (1,)
     number_address: int
     late: FloatArray  # lateness at each deadline [s], shape (most,) or more
-    result: Ints  # steps made, deadlines met, topic of a command that was taken; shape (3,)
+    points: (
+        FloatArray  # position and quaternion of each pose that is kept, shape (most, 7) or more
+    )
+    stamps: Ints  # their stamps [ns], shape (most,) or more
+    result: Ints  # steps made, deadlines met, topic of a command that was taken, poses kept; (4,)
 
 
 @entry_with(*(Path(str(m.__file__)) for m in (frames, imu, trajectory, tick_inbox)))
@@ -146,7 +153,7 @@ def run(  # noqa: PLR0917
         DONE: call again; PYTHON: the next step is Python's; TAKEN: the message in the inbox is
         Python's; FAILED: it could not publish the message that is due now.
     """
-    k = deadlines = 0
+    k = deadlines = points = 0
     reason = DONE
     while k < limits.most and reason == DONE and shared.attention[0] == 0:
         now = _stamp(time, k)
@@ -197,9 +204,24 @@ def run(  # noqa: PLR0917
             if at_message and not _publish_state(c, outbox, flight, inputs.held, _stamp(time, k)):
                 reason = FAILED
                 break
-    shared.result[0] = k
-    shared.result[1] = deadlines
+            points = _keep_point(outbox, limits, shared, points, k, _stamp(time, k))
+    for i, number in ((0, k), (1, deadlines), (3, points)):
+        shared.result[i] = number
     return reason
+
+
+@inline
+def _keep_point(  # noqa: PLR0917
+    outbox: Outbox, limits: Limits, shared: Shared, points: int, k: int, now: int
+) -> int:
+    """Keep the pose for the path, if that is due at step `k`; return how many are kept."""
+    steps = k - limits.point_step
+    if limits.point_every <= 0 or steps < 0 or steps % limits.point_every != 0:
+        return points
+    for i in range(POSE_SIZE):
+        shared.points[points, i] = outbox.values[MOTION + i]
+    shared.stamps[points] = now
+    return points + 1
 
 
 @inline

@@ -393,6 +393,32 @@ def test_requests_and_new_subscribers_do_not_wait_for_the_compiled_loop(world):
     assert sorted(waits)[10] < 0.05
 
 
+def test_who_subscribes_to_the_path_later_gets_all_of_it(world):
+    """Without subscribers compiled code keeps the points, and Python makes no step for them."""
+    sim = world.sim('/late', publish_rate=500.0, path_rate=50.0, launch__height=500.0)
+    motion = world.received('/late', ['odom'])['odom']
+    world.subscribed(sim, 'odom')
+    sim.start()
+    world.until(lambda: sim.steps_compiled > 1500, 'compiled steps')
+    by_python = sim.loop.clock.steps - sim.steps_compiled
+    assert by_python < 0.5 * sim.loop.clock.steps / 20  # there is a point every 20 steps
+    paths = world.received('/late', ['path'])['path']
+    world.until(lambda: paths, 'a path')
+    path = deserialize_message(paths[0], PathMessage)
+    of_stamp = {stamp_of(m): m for m in (deserialize_message(x, Odometry) for x in motion)}
+    released = min(stamp for stamp, m in of_stamp.items() if m.twist.twist.linear.x != 0.0)
+    assert [stamp_of(p) - released for p in path.poses] == [
+        20 * MS * i for i in range(len(path.poses))
+    ]
+    assert len(path.poses) > 60
+    world.until(
+        lambda: stamp_of(deserialize_message(motion[-1], Odometry)) > stamp_of(path), 'odom'
+    )
+    of_stamp |= {stamp_of(m): m for m in (deserialize_message(x, Odometry) for x in motion)}
+    for point in path.poses:
+        assert point.pose == of_stamp[stamp_of(point)].pose.pose
+
+
 # ---- where it does not run ----
 
 
