@@ -138,6 +138,11 @@ def _check_times(name: str, kind: str, t: FloatArray) -> None:
         raise ConfigError(f'{name}: {kind}', f'{t[-1] - t[0]:g} s', 'a flight takes at most 60 s')
 
 
+def _falls_up(o: Positions) -> bool:
+    """Return True if the path curves upwards, to smaller Z."""
+    return bool(np.polyfit(o.t, o.XYZ[:, 2], 2)[0] < 0.0)
+
+
 def _check_motion(name: str, o: Observation) -> None:
     """Refuse what cannot be the flight of a disc.
 
@@ -159,6 +164,9 @@ def _check_motion(name: str, o: Observation) -> None:
         if isinstance(o, Positions) and np.ptp(o.XYZ[:, 2]) < _FLATTEST and o.t[-1] > 1.0:
             allowed = f'a disc in the air rises or falls by more than {_FLATTEST:g} m'
             raise ConfigError(f'{name}: {o.kind}', 'it stays at one height', allowed)
+        if isinstance(o, Positions) and o.XYZ[:, 2].min() > 0.0 and _falls_up(o):
+            allowed = 'z is up from the ground; is it down in these measurements?'
+            raise ConfigError(f'{name}: {o.kind}', 'below the ground, and it falls up', allowed)
     if isinstance(o, Gyro):
         spin = float(np.median(np.abs(o.pqr[:, 2])))
         limit = LAUNCH['spin'].highest

@@ -97,6 +97,11 @@ def test_a_file_becomes_a_disc_a_report_and_a_document(throw, tmp_path, capsys):
             [[0.2 * i, i, 0, 0.1] for i in range(20)],
             'stays at one height',  # a rover
         ),
+        (
+            ['t_s', 'x_m', 'y_m', 'z_m'],
+            [[0.1 * i, i, 0, 2.5 * (0.1 * i - 1.0) ** 2 - 4.0] for i in range(20)],
+            'is it down',  # z of the paper
+        ),
         (['t_s', 'x_m', 'y_m'], [[0.1 * i, i, 0] for i in range(20)], '--camera-height'),
         (['x_m', 'y_m', 'z_m'], [[i, 0, 1] for i in range(9)], 't_s'),
         (['t_s', 'a', 'b'], [[i, 0, 1] for i in range(9)], 'give columns of'),
