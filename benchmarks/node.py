@@ -237,9 +237,7 @@ def tried(
         if command_rate:
             stack.enter_context(role('command', str(command_rate)))
         watch = stack.enter_context(Watch.running())
-        if kind == 'naive' or sleeper is not None:
-            pass  # no diagnostics
-        else:
+        if kind != 'naive' and sleeper is None:  # the others have no diagnostics
             watch.wait()
         if subscriber is not None:
             wait_for_line(subscriber)

@@ -1,24 +1,28 @@
-"""Solve the least-squares problem: starts, robust loss, and the best parameters so far."""
+"""Solve the least-squares problem: starts, steps, and the best parameters so far."""
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import partial
 import itertools
 import math
-from typing import TypeVar
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import local
 from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
+from disc_sim_ros.estimation.normal_equations import (
+    cost_of_throw,
+    each,
+    linear_blocks,
+    reduced,
+    robust_loss,
+    solved,
+    weights,
+)
 from disc_sim_ros.estimation.observations import ATTITUDE, GYRO
 from disc_sim_ros.estimation.problem import ROUGH, Problem
 from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw
-from disc_sim_ros.threads import Threads
 
-_CORNER = 2.5  # standard deviations at which the loss of a residual turns from square to straight
 _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
 _HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone
 _MOST_TRIES = 8  # of a step with more and more damping
@@ -35,7 +39,6 @@ _SPINS, _SPIN_STEP = (
 )  # neighbours of a fitted spin rate, each way, and their distance [rad/s]
 BETTER = 0.5  # decrease of the cost for which a release is exchanged
 
-_T = TypeVar('_T')
 Progress = Callable[[str, int, float], None]
 
 
@@ -65,59 +68,6 @@ class Solution:
     cost: float
 
 
-def robust_loss(residuals: FloatArray) -> FloatArray:
-    """Return half the loss of each residual: its square, and beyond the corner straight on."""
-    loss: FloatArray = _CORNER**2 * (np.sqrt(1.0 + residuals**2 / _CORNER**2) - 1.0)
-    return loss
-
-
-def weights(residuals: FloatArray) -> FloatArray:
-    """Return the weight of each residual in the robust loss, 1 for a small one."""
-    weight: FloatArray = 1.0 / np.sqrt(1.0 + residuals**2 / _CORNER**2)
-    return weight
-
-
-def cost_of_throw(problem: Problem, k: int, here: FloatArray) -> float:
-    """Return half the robust sum of squares of throw `k` with the prior of its release."""
-    prior = problem.release_priors(k, here[problem.shared :])
-    return float(robust_loss(problem.residuals(k, here)).sum() + 0.5 * (prior**2).sum())
-
-
-def each(problem: Problem, work: Callable[[int], _T]) -> list[_T]:
-    """Return the results for all throws, computed side by side."""
-    n = len(problem.throws)
-    with closing(Threads(most=n)) as pool:
-        return pool.run(partial(work, k) for k in range(n))
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """The normal equations of one throw."""
-
-    shared: FloatArray  # of the shared parameters, shape (s, s)
-    mixed: FloatArray  # shape (s, 12)
-    own: FloatArray  # of the release, with its prior, shape (12, 12)
-    gradient: FloatArray  # by the shared parameters, shape (s,)
-    own_gradient: FloatArray  # by the release, shape (12,)
-
-
-def linear_block(problem: Problem, k: int, x: FloatArray) -> Block:
-    """Return the normal equations of throw `k` at all parameters, shape (p,)."""
-    here = problem.here(k, x)
-    r, slopes = problem.linearised(k, here)
-    weighted = weights(r)[:, np.newaxis] * slopes
-    normal, gradient = slopes.T @ weighted, weighted.T @ r
-    n, root = problem.shared, problem.throws[k].information
-    prior = problem.release_priors(k, here[n:])
-    return Block(
-        normal[:n, :n],
-        normal[:n, n:],
-        normal[n:, n:] + root.T @ root,
-        gradient[:n],
-        gradient[n:] + root.T @ prior,
-    )
-
-
 def fit_release(
     problem: Problem, k: int, here: FloatArray, most_steps: int = 8
 ) -> tuple[FloatArray, float]:
@@ -144,7 +94,7 @@ def fit_release(
         if _promised(normal, gradient) < _SMALL:
             break
         for _ in range(_MOST_TRIES):
-            step = _solved(normal, -gradient, damping)
+            step = solved(normal, -gradient, damping)
             tried = here.copy()
             tried[n:] += step
             tried_cost = cost_of_throw(problem, k, tried)
@@ -195,26 +145,14 @@ def solve(
         keeper.offer(x, cost)
         if progress is not None:
             progress(stage, count, cost)
-        blocks = each(problem, lambda k, x=x: linear_block(problem, k, x))  # type: ignore[misc]
-        inverses = [np.linalg.inv(b.own) for b in blocks]
-        prior = problem.shared_priors(x[:n]) / problem.shared_deviations
-        normal = np.diag(1.0 / problem.shared_deviations**2)
-        gradient = prior.copy()
-        for b, inverse in zip(blocks, inverses, strict=True):
-            normal = normal + b.shared - b.mixed @ inverse @ b.mixed.T
-            gradient = gradient + b.gradient - b.mixed @ (inverse @ b.own_gradient)
+        equations = reduced(problem, x, linear_blocks(problem, x))
         before = cost
         enough = _SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0)
-        whole = step_within(x[:n], normal, gradient, 0.0, (low, high))
-        if -float(whole @ gradient) / 2.0 < enough:
+        whole = equations.step(0.0)
+        if -float(whole @ equations.gradient) / 2.0 < enough:
             break
         for _ in range(_MOST_TRIES):
-            step = step_within(x[:n], normal, gradient, damping, (low, high))
-            tried = x.copy()
-            tried[:n] += step
-            for k, (b, inverse) in enumerate(zip(blocks, inverses, strict=True)):
-                tried[problem.own(k)] -= inverse @ (b.own_gradient + b.mixed.T @ step)
-            tried, tried_cost = _released(problem, tried)
+            tried, tried_cost = _released(problem, equations.moved(equations.step(damping)))
             if tried_cost < cost:
                 x, cost, damping = tried, tried_cost, damping * 0.1
                 break
@@ -236,34 +174,9 @@ def _released(problem: Problem, x: FloatArray) -> tuple[FloatArray, float]:
     return x, float(sum(cost for _, cost in fitted) + 0.5 * (prior**2).sum())
 
 
-def step_within(
-    x: FloatArray,
-    normal: FloatArray,
-    gradient: FloatArray,
-    damping: float,
-    bounds: tuple[FloatArray, FloatArray],
-) -> FloatArray:
-    """Return a step that stays in the bounds; a parameter at one does not move outwards."""
-    low, high = bounds
-    free = ~(((x <= low) & (gradient > 0.0)) | ((x >= high) & (gradient < 0.0)))
-    step = np.zeros_like(x)
-    step[free] = _solved(normal[np.ix_(free, free)], -gradient[free], damping)
-    return np.clip(x + step, low, high) - x
-
-
 def _promised(normal: FloatArray, gradient: FloatArray) -> float:
     """Return the decrease of the cost that a Gauss-Newton step promises."""
-    return -0.5 * float(gradient @ _solved(normal, -gradient, 0.0))
-
-
-def _solved(normal: FloatArray, right: FloatArray, damping: float) -> FloatArray:
-    """Return the damped Gauss-Newton step, in parameters of any units."""
-    scale = 1.0 / np.sqrt(np.diag(normal))
-    scaled = normal * np.outer(scale, scale)
-    step: FloatArray = scale * np.linalg.solve(
-        scaled + damping * np.eye(len(scale)), scale * right
-    )
-    return step
+    return -0.5 * float(gradient @ solved(normal, -gradient, 0.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,15 +19,17 @@ from disc_sim_ros.estimation.fitting import (
     BETTER,
     KEPT,
     MORE_KEPT,
-    Block,
     Progress,
-    each,
-    linear_block,
     promising,
     retry_releases,
-    robust_loss,
     starts,
-    step_within,
+)
+from disc_sim_ros.estimation.normal_equations import (
+    Block,
+    costs_of_throw,
+    each,
+    linear_blocks,
+    reduced,
 )
 from disc_sim_ros.estimation.problem import FINE, Problem
 from disc_sim_ros.estimation.throws import RELEASE_SIZE
@@ -186,7 +188,7 @@ def _joint(
     cost = float(_costs(problem, x[np.newaxis])[0])
     damping = _FIRST_DAMPING
     for _ in range(most_steps):
-        blocks = each(problem, lambda k, x=x: linear_block(problem, k, x))  # type: ignore[misc]
+        blocks = linear_blocks(problem, x)
         gain = 0.0
         while gain <= 0.0 and damping < _MOST_DAMPING:
             tried = np.stack([_moved(problem, x, blocks, d * damping) for d in _DAMPINGS])
@@ -204,23 +206,8 @@ def _joint(
 
 def _moved(problem: Problem, x: FloatArray, blocks: list[Block], damping: float) -> FloatArray:
     """Return the parameters after one damped step."""
-    n = problem.shared
-    priors = 1.0 / problem.shared_deviations**2
-    whole = np.diag(priors) + sum(b.shared for b in blocks)
-    normal = whole + damping * np.diag(np.diag(whole))
-    gradient = problem.shared_priors(x[:n]) / problem.shared_deviations
-    inverses = []
-    for b in blocks:
-        inverse = np.linalg.inv(b.own + damping * np.diag(np.diag(b.own)))
-        inverses.append(inverse)
-        normal = normal - b.mixed @ inverse @ b.mixed.T
-        gradient = gradient + b.gradient - b.mixed @ (inverse @ b.own_gradient)
-    step = step_within(x[:n], normal, gradient, _SINGULAR, problem.bounds)
-    moved = x.copy()
-    moved[:n] += step
-    for k, (b, inverse) in enumerate(zip(blocks, inverses, strict=True)):
-        moved[problem.own(k)] -= inverse @ (b.own_gradient + b.mixed.T @ step)
-    return moved
+    equations = reduced(problem, x, blocks, damping)
+    return equations.moved(equations.step(_SINGULAR))
 
 
 def _costs(problem: Problem, several: FloatArray) -> FloatArray:
@@ -229,10 +216,7 @@ def _costs(problem: Problem, several: FloatArray) -> FloatArray:
 
     def of_throw(k: int) -> FloatArray:
         own = several[:, problem.own(k)]
-        prior = (own - problem.throws[k].believed) @ problem.throws[k].information.T
-        r = problem.whitened(k, np.concatenate([several[:, :n], own], axis=1))
-        cost: FloatArray = robust_loss(r).sum(axis=1) + 0.5 * (prior**2).sum(axis=1)
-        return cost
+        return costs_of_throw(problem, k, np.concatenate([several[:, :n], own], axis=1))
 
     priors = (several[:, :n] - problem.means[:n]) / problem.shared_deviations
     costs: FloatArray = 0.5 * (priors**2).sum(axis=1) + sum(each(problem, of_throw))

@@ -360,7 +360,7 @@ _FULL = 20.0  # squared residual at which a weight is one half
 
 def first_call_note() -> str:
     """Return one line for users on why the first update takes long; '' if it does not."""
-    return note_before(track_simd, sample_simd, lanes.normal_equations, seconds=50)
+    return note_before(track_simd, sample_simd, lanes.normal_equations, seconds=15)
 
 
 def up_axis(states: FloatArray) -> FloatArray:

@@ -229,9 +229,9 @@ class Problem:
         return residuals
 
     def release_priors(self, k: int, release: FloatArray) -> FloatArray:
-        """Return the residuals of the prior of a release, shape (12,)."""
+        """Return the residuals of the prior of a release or of several, shape (12,) or (m, 12)."""
         throw = self.throws[k]
-        residuals: FloatArray = throw.information @ (release - throw.believed)
+        residuals: FloatArray = (release - throw.believed) @ throw.information.T
         return residuals
 
     def here(self, k: int, x: FloatArray) -> FloatArray:

@@ -6,7 +6,8 @@ import math
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.fitting import BETTER, Progress, cost_of_throw, solve
+from disc_sim_ros.estimation.fitting import BETTER, Progress, solve
+from disc_sim_ros.estimation.normal_equations import cost_of_throw
 from disc_sim_ros.estimation.observations import GYRO
 from disc_sim_ros.estimation.problem import FINE, ROUGH, Problem
 

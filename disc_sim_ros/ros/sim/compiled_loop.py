@@ -199,7 +199,6 @@ class CompiledLoop:
                 most,
                 _whole(sim.commands.next_change()),
                 _whole(sim.next_throw),
-                sim.steps_to_path if out.path.has_subscribers else 0,
                 sim.steps_to_path,
                 0 if out.path.has_subscribers else sim.steps_per_point,
             ),
@@ -304,7 +303,7 @@ def compiled_loop(simulation: Simulation, publishers: Publishers) -> CompiledLoo
 
 def first_call_note() -> str:
     """Return one line for users on why `warm_up` takes long; '' if it does not."""
-    return simulator.first_call_note(*((tick.run,) if jit.COMPILED else ()), seconds=20)
+    return simulator.first_call_note(*((tick.run,) if jit.COMPILED else ()), seconds=12)
 
 
 def warm_up() -> None:
@@ -343,7 +342,7 @@ def warm_up() -> None:
             _REST, 1, floats, Velocity(0.0, 0.0, 0.0), floats, floats, *constants, floats, floats
         ),
         tick.Time(0, 0, 1, 1, 0, 1, 0.0, 1.0, 0, 1, 1, LONGEST_SLEEP, CATCH_UP),
-        tick.Limits(0, 0, 0, 0, 0, 0),
+        tick.Limits(0, 0, 0, 0, 0),
         tick.Shared(
             whole, whole, whole, 0, whole, 0, floats, table, whole, np.zeros(4, dtype=np.int64)
         ),

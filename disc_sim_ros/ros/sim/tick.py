@@ -114,9 +114,8 @@ class Limits(NamedTuple):
     most: int  # steps of this call
     change: int  # stamp from which a step is Python's [ns]
     throw_at: int  # stamp from which a message is Python's [ns]
-    python_step: int  # number of the step whose message is Python's
-    point_step: int  # number of the step whose pose is the first to be kept for the path
-    point_every: int  # steps from one such pose to the next; 0: none is kept
+    point_step: int  # number of the next step whose pose is a point of the path; 0: there is none
+    point_every: int  # steps from point to point, which are kept; 0: that message is Python's
 
 
 class Shared(NamedTuple):
@@ -183,7 +182,7 @@ def run(  # noqa: PLR0917
             now = _stamp(time, k)
             at_message = (time.phase + k + 1) % time.every == 0
             python_message = (
-                k + 1 == limits.python_step
+                (limits.point_every == 0 and k + 1 == limits.point_step)
                 or shared.attention[0] != 0
                 or _stamp(time, k + 1) >= limits.throw_at
             )
