@@ -274,4 +274,4 @@ def from_lanes(lanes: FloatArray, count: int) -> FloatArray:
 
 def first_call_note() -> str:
     """Return one line for users on why the first steps take long; '' if they do not."""
-    return note_before(step_batch.advance_batch, step_batch.release_batch, seconds=20)
+    return note_before(step_batch.advance_batch, step_batch.release_batch, seconds=10)

@@ -158,7 +158,7 @@ def fly_many(
 
 def first_call_note(setup: Setup) -> str:
     """Return one line for users on why the next `fly_many` takes long; '' if it does not."""
-    return note_before(_kernel(setup), seconds=25)
+    return note_before(_kernel(setup), seconds=20)
 
 
 def _kernel(setup: Setup) -> Callable[..., None]:

@@ -352,7 +352,7 @@ def lost(t: float, step: float | None) -> IntegrationError:
 
 def first_call_note() -> str:
     """Return one line for users on why the next `fly` takes long; '' if it does not."""
-    return note_before(adaptive.integrate_adaptive, seconds=20)
+    return note_before(adaptive.integrate_adaptive, seconds=12)
 
 
 def _line(disc: Disc) -> Linear:

@@ -153,4 +153,4 @@ def good_step(
 
 def first_call_note() -> str:
     """Return one line for users on why the next `fly_sampled` takes long; '' if it does not."""
-    return note_before(sample_simd if COMPILED else sample_rows, seconds=20)
+    return note_before(sample_simd if COMPILED else sample_rows, seconds=10)
