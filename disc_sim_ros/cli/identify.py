@@ -87,7 +87,14 @@ def parser(prog: str = 'identify') -> Parser:
         help=f'instruments to use, of {", ".join(GROUPS)} '
         f'(default: {", ".join(identify_input.USED)})',
     )
-    add_quantity(made, '--spin', LAUNCH['spin'], default=argparse.SUPPRESS)
+    add_quantity(
+        made,
+        '--spin',
+        LAUNCH['spin'],
+        default=argparse.SUPPRESS,
+        text='spin rate at the releases where no gyro measures it, clockwise from above positive; '
+        'taken as known to 5 %',
+    )
     for name in ('camera_height', 'accelerometer_range'):
         add_quantity(
             made, f'--{name.replace("_", "-")}', IDENTIFICATION[name], default=argparse.SUPPRESS
@@ -116,7 +123,8 @@ def parser(prog: str = 'identify') -> Parser:
     )
     for field in ('speed', 'angle', 'hyzer', 'spin'):
         name = f'release_{field}_error'
-        add_quantity(made, f'--{name.replace("_", "-")}', IDENTIFICATION[name])
+        text = f'standard error of the {field} in --techdisc'
+        add_quantity(made, f'--{name.replace("_", "-")}', IDENTIFICATION[name], text=text)
     text = 'mean wind beforehand, in map axes'
     add_components(made, '--wind', list(MEAN_WIND.values())[:2], ('X', 'Y'), text)
     add_quantity(made, '--wind-error', IDENTIFICATION['wind_error'])
