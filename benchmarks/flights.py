@@ -9,6 +9,7 @@ usage: benchmarks/flights.py
 """
 
 from dataclasses import asdict
+import itertools
 import math
 import os
 from pathlib import Path
@@ -16,6 +17,7 @@ import platform
 import subprocess
 import sys
 import time
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 
@@ -24,6 +26,7 @@ import numpy as np
 
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.flight import Setup, fly
+from disc_sim_ros.physics.kernels import dopri5, rk4
 from disc_sim_ros.physics.launch import Launch
 from lines import Line, number, print_lines
 from reference.cases import FRISBEE
@@ -42,11 +45,9 @@ NEIGHBOURS = (FIG_5, Launch(speed=15.3), Launch(pitch=14.0), Launch(spin=-31.416
 def main() -> None:
     """Print the measurements."""
     if os.environ.get('NUMBA_DISABLE_JIT') == '1':
-        print(
-            time_per_flight(
-                Setup(disc=disc_file.load_disc('frisbee_as_printed'), step=STEPS[-1]), rounds=3
-            )
-        )
+        disc = disc_file.load_disc('frisbee_as_printed')
+        print(time_per_flight(Setup(disc=disc, step=STEPS[-1]), rounds=3))
+        print(evaluations(Setup(disc=disc)), evaluations(Setup(disc=disc, step=STEPS[0])))
         return
     print_lines(lines())
 
@@ -76,7 +77,8 @@ def lines() -> tuple[Line, ...]:
     default_error = worst(default, landings)
     default_rate = 1.0 / time_per_flight(default, ROUNDS)
     print(f' control {default_error * 1e3:47.6f} {1e6 / default_rate:11.1f} {default_rate:15.0f}')
-    plain = 1.0 / plain_python_time()
+    seconds, controlled, fixed = in_plain_python()
+    plain = 1.0 / seconds
     return (
         Line(
             what='Fig. 5 flights, one `fly` each',
@@ -92,6 +94,13 @@ def lines() -> tuple[Line, ...]:
             ratio=default_rate / rate,
             bound=f'at least {LEAST:,}, less than {CONTROLLED * 1e3:g} mm off',
             kept=default_rate >= LEAST and default_error < CONTROLLED,
+        ),
+        Line(
+            what='equations of motion evaluated for it',
+            ours=f'{controlled:,.0f}, {number(default_error * 1e3, 1)} mm off',
+            beside=f'{STEPS[0] * 1e3:g} ms steps of RK4 {fixed:,.0f}, '
+            f'{number(measured[0][2] * 1e3, 1)} mm off',
+            ratio=fixed / controlled,
         ),
         Line(
             what=f'the same, {STEPS[-1] * 1e3:g} ms steps',
@@ -132,13 +141,34 @@ def landing_of_reference(launch: Launch) -> list[float]:
     return list(reference_flight(FRISBEE, thrown)['landing_position_m'])
 
 
-def plain_python_time() -> float:
-    """Return the CPU seconds of one flight without numba, measured in a process of its own."""
+def evaluations(setup: Setup) -> int:
+    """Return how often a flight in plain Python evaluates the equations, its landing included."""
+    kernel = dopri5 if setup.step is None else rk4
+    derivative, count = kernel.derivative, itertools.count()
+
+    def counted(*arguments: Any) -> Any:
+        next(count)
+        return derivative(*arguments)
+
+    kernel.derivative = counted
+    try:
+        fly(FIG_5, setup)
+    finally:
+        kernel.derivative = derivative
+    return next(count)
+
+
+def in_plain_python() -> tuple[float, float, float]:
+    """Return the CPU seconds of one flight without numba, in a process of its own.
+
+    And how often the equations are evaluated by default and in the shortest of STEPS.
+    """
     environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
     done = subprocess.run(
         [sys.executable, __file__], env=environment, capture_output=True, text=True, check=True
     )
-    return float(done.stdout)
+    seconds, controlled, fixed = map(float, done.stdout.split())
+    return seconds, controlled, fixed
 
 
 def cpu_name() -> str:
