@@ -55,12 +55,13 @@ def one(data: bytes) -> None:
 
 def _measured(data: bytes) -> None:
     _FILE.write_bytes(data)
-    for name, columns in throw_csv.read(_FILE).items():
+    throws = throw_csv.read(_FILE).throws
+    for name, columns in throws.items():
         kept = {kind: values for kind, values in columns.items() if kind != 'acceleration'}
         throw = measured.throw_from(name, kept, _DISC, measured.Instruments(9.81, 8.0))
         if not throw.observations:
             raise AssertionError(f'{name}: a throw without a measurement')
-    replay.read_csv(_FILE)
+        replay.measurements_of(name, columns)
 
 
 def _sensor(data: bytes) -> None:

@@ -61,8 +61,8 @@ def parser(prog: str = 'fly') -> Parser:
         default=argparse.SUPPRESS,
         metavar='FILE.csv',
         help='fly the throws of this file of a TechDisc, one a row, from --height; columns '
-        'speedMph or speedKmh, spinRpm, launchAngle, noseAngle, hyzerAngle, and, if there, '
-        'wobbleAngle and throwType',
+        'speedMph, speedKmh or speedMps, spinRpm, launchAngle, noseAngle, hyzerAngle, and, if '
+        'there, wobbleAngle and throwType',
     )
     pages.add_page(shown)
     shape = shown.add_mutually_exclusive_group()

@@ -5,15 +5,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from disc_sim_ros import validation
+from disc_sim_ros.cli import measured_file
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import flight
 from disc_sim_ros.quantities import IDENTIFICATION
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from disc_sim_ros.estimation.problem import Prior
     from disc_sim_ros.estimation.releases import ReleaseErrors
+    from disc_sim_ros.estimation.throw_csv import Columns
     from disc_sim_ros.estimation.throws import Throw
     from disc_sim_ros.physics.thrower import Release
 
@@ -27,7 +29,7 @@ def throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
         check_different,
         throw_from,
     )
-    from disc_sim_ros.estimation.throw_csv import GROUPS  # noqa: PLC0415
+    from disc_sim_ros.estimation.throw_csv import GROUPS, label  # noqa: PLC0415
 
     instruments = Instruments(
         gravity=setup.air.gravity,
@@ -42,8 +44,8 @@ def throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
     names = [Path(source).name for source in chosen.throws]
     for source, short in zip(chosen.throws, names, strict=True):
         of = short if names.count(short) == 1 else source  # files of two folders
-        for number, columns in _read(source).items():
-            name = f'throw {number}' if number.isdigit() else number
+        for throw, columns in _read(source, chosen.prog).items():
+            name = label(throw)
             full = name if len(chosen.throws) == 1 else f'{of} {name}'
             if full in measured:
                 raise ConfigError('throws', source, 'it is given twice')
@@ -128,12 +130,10 @@ def prior(chosen: argparse.Namespace) -> 'Prior':
     )
 
 
-def _read(source: str) -> 'dict[str, dict]':  # type: ignore[type-arg]
-    """Return the measurements of a file or a bag."""
+def _read(source: str, prog: str) -> 'Mapping[str, Columns]':
+    """Return the measurements of each throw of a file or a bag."""
     if Path(source).suffix.lower() == '.csv':
-        from disc_sim_ros.estimation import throw_csv  # noqa: PLC0415
-
-        return throw_csv.read(source)  # type: ignore[return-value]
+        return measured_file.read(source, 'THROWS', prog)
     from disc_sim_ros.analysis import measured_flights  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
 

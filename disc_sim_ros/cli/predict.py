@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from disc_sim_ros import __version__
-from disc_sim_ros.cli import output, pages
+from disc_sim_ros.cli import measured_file, output, pages
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.cli.flags import Discs
 from disc_sim_ros.cli.main import run_program
@@ -78,14 +78,19 @@ def _run(chosen: argparse.Namespace) -> int:
 
     plot = getattr(chosen, 'plot', None)
     config, system = _config(chosen), SYSTEMS[chosen.units]
-    series = _measurements(chosen)
+    recordings = _measurements(chosen)
     note = first_call_note()
     if note:
         output.note(chosen.prog, note)
-    throws = replay(series, config)
+    throws = replay(recordings, config)
     if not throws:
-        count = sum(len(measurements) for measurements in series)
-        raise DiscSimError(f'{chosen.source}: no throw in {count} measurements')
+        count = sum(len(measurements) for measurements in recordings.values())
+        ask = 'are positions in m with z up, and times in s, in their order?'
+        raise DiscSimError(f'{chosen.source}: no throw in {count} measurements; {ask}')
+    for name in recordings if len(recordings) > 1 else ():
+        if not any(throw.name.removesuffix(', 1') == name for throw in throws):
+            count = len(recordings[name])
+            output.note(chosen.prog, f'{name}: not recognised as a throw, {count} measurements')
     if chosen.json:
         document = {'throws': [_document(throw, config.discs) for throw in throws]}
         output.show(json.dumps(document, allow_nan=False))
@@ -126,20 +131,27 @@ def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
     return predictor_config(setups, {name: getattr(chosen, name) for name in PREDICTION})
 
 
-def _measurements(chosen: argparse.Namespace) -> 'list[list[Measurement]]':
+def _measurements(chosen: argparse.Namespace) -> 'dict[str, list[Measurement]]':
     """Return the measurements of each recording: of a bag, or of each throw of a file."""
-    from disc_sim_ros.estimation import replay  # noqa: PLC0415
+    from disc_sim_ros.estimation import replay, throw_csv  # noqa: PLC0415
 
     source = Path(chosen.source)
     if source.suffix.lower() == '.csv':
         if chosen.topic is not None:
             raise ConfigError('--topic', chosen.topic, 'a CSV file has no topics')
-        series = replay.read_csv(source)
+        throws = measured_file.read(chosen.source, 'FILE', chosen.prog)
+        recordings = {
+            throw_csv.label(name): replay.measurements_of(throw_csv.label(name), columns)
+            for name, columns in throws.items()
+        }
     else:
-        series = [_of_bag(source, chosen.topic)]
+        recordings = {source.name: _of_bag(source, chosen.topic)}
     if chosen.position_only:
-        return [[dataclasses.replace(m, axis=None) for m in of] for of in series]
-    return series
+        return {
+            name: [dataclasses.replace(m, axis=None) for m in of]
+            for name, of in recordings.items()
+        }
+    return recordings
 
 
 def _of_bag(source: Path, topic: str | None) -> 'list[Measurement]':
@@ -187,6 +199,7 @@ def _document(throw: 'FollowedThrow', discs: Sequence[str]) -> dict[str, Any]:
     last = throw.predictions[-1]
     return {
         'throw': throw.number,
+        'name': throw.name,
         'begins_s': last.reference_time,
         'landing_m': [float(x), float(y)],
         'time_of_flight_s': float(time) - last.reference_time,
@@ -212,9 +225,9 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> st
     last = throw.predictions[-1]
     whole = throw.is_complete
     lines = [
-        f'throw {throw.number}: measured from {last.reference_time:.3f} s, '
+        f'{throw.name}: measured from {last.reference_time:.3f} s, '
         f'{"lands" if whole else "would land"} at '
-        f'x {system.text(x, "m")}, y {system.text(y, "m")} '
+        f'x {system.text(x, "m", "z.2f")}, y {system.text(y, "m", "z.2f")} '
         f'after {time - last.reference_time:.2f} s'
     ]
     if not whole:
@@ -233,8 +246,8 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> st
             f'  {r["watched_s"]:8.1f}  {r["x_m"]:7.2f}  {r["y_m"]:7.2f}  '
             f'{r["sigma_x_m"]:7.2f} {r["sigma_y_m"]:7.2f}  {r["from_last_m"]:9.2f}{stale}'
         )
-    wind = system.number(last.wind[0], 'm/s'), system.text(last.wind[1], 'm/s', '.1f')
-    lines.append(f'  estimated wind {wind[0]:.1f}, {wind[1]}')
+    wind = f'{system.number(last.wind[0], "m/s"):z.1f}, {system.text(last.wind[1], "m/s", "z.1f")}'
+    lines.append(f'  estimated wind {wind}')
     if len(discs) > 1:
         likely = sorted(
             zip(discs, last.weights, strict=True), key=lambda pair: pair[1], reverse=True
@@ -257,14 +270,14 @@ def _figure(throws: 'Sequence[FollowedThrow]', system: System) -> 'Figure':
     for i, throw in enumerate(throws):
         colour = COLOURS[i % len(COLOURS)]
         of = 'landing' if throw.is_complete else 'last prediction: it was measured in part'
-        label = f'throw {throw.number}: miss of the {of}'
+        label = f'{throw.name}: miss of the {of}'
         misses = system.number(throw.misses, 'm')
         axis.semilogy(throw.watched, misses, color=colour, label=label)
         sigma = [
             system.number(float(p.covariance[:2, :2].trace()) ** 0.5, 'm')
             for p in throw.predictions
         ]
-        label = f'throw {throw.number}: standard deviation that the predictor states'
+        label = f'{throw.name}: standard deviation that the predictor states'
         axis.semilogy(throw.watched, sigma, color=colour, ls=':', label=label)
     axis.set(xlabel='measured for, s', ylabel=f'distance on the ground, {system.length}')
     axis.set_ylim(bottom=system.number(LEAST_MISS, 'm'))  # the last miss is 0

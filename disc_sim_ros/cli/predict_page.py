@@ -48,7 +48,7 @@ def shown_throw(
         paths=[_path(predictor, p) for p in throw.predictions],
     )
     flight = fitted_flight(throw, config, RATE)
-    return ShownFlight(f'throw {throw.number}', result, flight, predictions=shown)
+    return ShownFlight(throw.name, result, flight, predictions=shown)
 
 
 def _path(predictor: Predictor, p: Prediction) -> 'FloatArray':

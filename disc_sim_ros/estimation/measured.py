@@ -131,9 +131,10 @@ def _check_times(name: str, kind: str, t: FloatArray) -> None:
     if (steps <= 0.0).any():
         i = int(np.argmax(steps <= 0.0)) + 1
         where = f'{name}: {kind}: sample {i + 1}'
-        raise ConfigError(
-            where, f't = {t[i]:g} s', f'time must increase, before it is {t[i - 1]:g}'
-        )
+        allowed = f'time must increase, the sample before is at {t[i - 1]:g} s'
+        if steps[i - 1] < 0.0:
+            allowed += '; is it of another throw?'
+        raise ConfigError(where, f't = {t[i]:g} s', allowed)
     if t[-1] - t[0] > 60.0:
         raise ConfigError(f'{name}: {kind}', f'{t[-1] - t[0]:g} s', 'a flight takes at most 60 s')
 

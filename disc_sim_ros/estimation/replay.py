@@ -1,8 +1,7 @@
 """Recorded measurements through the predictor, as if they came in now."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -24,12 +23,14 @@ class FollowedThrow:
 
     Attributes:
         number: From 1.
+        name: For people: that of its recording, where there are several, or `throw 1`.
         predictions: In the order of the measurements. Each has the covariance of the last
             ellipse, as `predictor_node` publishes it.
         measurements: Those from the beginning of the throw to the last prediction.
     """
 
     number: int
+    name: str
     predictions: tuple[Prediction, ...]
     measurements: tuple[Measurement, ...]
 
@@ -64,11 +65,24 @@ class FollowedThrow:
 
 
 def replay(
-    recordings: Iterable[Iterable[Measurement]], config: PredictorConfig
+    recordings: Mapping[str, Iterable[Measurement]], config: PredictorConfig
 ) -> list[FollowedThrow]:
-    """Return the predictions of every throw in recordings, each with a clock of its own."""
-    throws = [of for measurements in recordings for of in _replayed(measurements, config)]
-    return [FollowedThrow(number, *of) for number, of in enumerate(throws, 1)]
+    """Return the predictions of every throw in recordings, each with a clock of its own.
+
+    Args:
+        recordings: Measurements in their order, by the name of the recording.
+        config: What is known beforehand.
+    """
+    throws: list[FollowedThrow] = []
+    for recording, series in recordings.items():
+        replayed = _replayed(series, config)
+        for k, (predictions, measured) in enumerate(replayed, 1):
+            number = len(throws) + 1
+            name = f'throw {number}'
+            if len(recordings) > 1:
+                name = recording if len(replayed) == 1 else f'{recording}, {k}'
+            throws.append(FollowedThrow(number, name, predictions, measured))
+    return throws
 
 
 def _replayed(
@@ -148,25 +162,24 @@ def _axis(quaternion: FloatArray) -> tuple[float, float, float] | None:
     return -float(down[0]), float(down[1]), float(down[2])
 
 
-def read_csv(path: Path) -> list[list[Measurement]]:
-    """Return the measurements of each throw of a CSV file, see `throw_csv`.
+def measurements_of(name: str, columns: throw_csv.Columns) -> list[Measurement]:
+    """Return measurements at the times of the positions, with the attitudes of those times.
+
+    Args:
+        name: Of the throw, for errors.
+        columns: What `throw_csv.read` returns of it.
 
     Raises:
-        ConfigError: The file cannot be read, or has no positions.
+        ConfigError: There is no position, or one too far away for any field.
     """
-    return [_of_columns(path, columns) for columns in throw_csv.read(path, 'FILE').values()]
-
-
-def _of_columns(path: Path, columns: throw_csv.Columns) -> list[Measurement]:
-    """Return measurements at the times of the positions, with the attitudes of those times."""
     if 'position' not in columns:
         needed = ', '.join((throw_csv.TIME, *throw_csv.GROUPS['position']))
-        raise ConfigError('FILE', f'{path}: {", ".join(columns) or "nothing"}', f'give {needed}')
+        raise ConfigError('FILE', f'{name}: {", ".join(columns) or "nothing"}', f'give {needed}')
     time, position = columns['position']
     far = float(np.abs(position).max())
     if far > POSITION.highest:
         allowed = f'{POSITION.allowed}; are the positions in m?'
-        raise ConfigError('FILE', f'{path}: {far:g}', allowed)
+        raise ConfigError('FILE', f'{name}: {far:g}', allowed)
     quaternion = None
     if 'attitude' in columns:
         quaternion = np.zeros((len(time), 4))

@@ -10,17 +10,21 @@ Columns, by name, in any order; an empty cell is no measurement:
 | qx, qy, qz, qw | attitude from `disc` or `disc_body` to `map` |
 | p_rad_s, q_rad_s, r_rad_s | gyro fixed in the disc: x, y in its plane, z through the underside |
 | fx_m_s2, fy_m_s2, fz_m_s2 | accelerometer at the centre, in the axes of the gyro |
+
+Positions may also have the names that `fly --csv` gives them. `csv_table` says what else a file
+may look like.
 """
 
 from collections.abc import Mapping
-import csv
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from disc_sim_ros import csv_table
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.csv_table import Table
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.files import reason
 
 TIME, THROW = 't_s', 'throw'
 GROUPS = {
@@ -29,108 +33,103 @@ GROUPS = {
     'gyro': ('p_rad_s', 'q_rad_s', 'r_rad_s'),
     'acceleration': ('fx_m_s2', 'fy_m_s2', 'fz_m_s2'),
 }
+_OF_FLY = {f'position_{column}': column for column in GROUPS['position']}  # `fly --csv`
+_KNOWN = (TIME, THROW, *(column for columns in GROUPS.values() for column in columns))
 CAMERA_COLUMNS = ('x_m', 'y_m')
-_MOST_ROWS = 1_000_000
 _LARGEST = 1e100  # larger numbers are none: their squares are infinite
 
 Columns = Mapping[str, tuple[FloatArray, FloatArray]]  # times (n,) and values (n, d) by instrument
 
 
-def read(path: Path | str, thing: str = 'THROWS') -> dict[str, Columns]:
-    """Return the measurements of each throw of a file, by the name of the throw.
+@dataclass(frozen=True)
+class MeasuredThrows:
+    """What a file holds.
+
+    Attributes:
+        throws: By the name of the throw the times [s] and values of each instrument that has
+            any: 'position' (map), 'camera' (map, x and y), 'attitude' (x, y, z, w), 'gyro',
+            'acceleration'.
+        unread: Columns that are none of these.
+    """
+
+    throws: dict[str, Columns]
+    unread: tuple[str, ...]
+
+
+def read(path: Path | str, thing: str = 'THROWS') -> MeasuredThrows:
+    """Return the measurements of each throw of a file.
 
     Args:
         path: The file.
         thing: What the file is to the user, for errors.
 
-    Returns:
-        For each throw the times [s] and values of each instrument that has any: 'position' (map),
-        'camera' (map, x and y), 'attitude' (x, y, z, w), 'gyro', 'acceleration'.
-
     Raises:
         ConfigError: The file cannot be read, lacks a column, or holds something that is not a
             finite number; the message names file, line and column.
     """
-    name = str(path)
-    try:
-        text = Path(path).expanduser().read_text(encoding='utf-8-sig')
-    except (OSError, ValueError) as error:
-        why = reason(error) if isinstance(error, OSError) else 'it is no text in UTF-8'
-        raise ConfigError(thing, name, f'cannot read it ({why})') from None
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.startswith('#')
-    ]
-    if len(lines) > _MOST_ROWS:
-        raise ConfigError(thing, f'{name}: {len(lines)} rows', f'at most {_MOST_ROWS} rows')
-    if not lines:
-        raise ConfigError(thing, name, 'the file is empty')
-    head = _cells(thing, name, *lines[0])
-    instruments = _instruments(thing, name, head)
-    at = {column: place for place, column in enumerate(head)}
+    table = csv_table.read(path, thing).renamed(_OF_FLY)
+    instruments = _instruments(table)
+    at = {column: place for place, column in enumerate(table.columns)}
     rows: dict[str, dict[str, list[list[float]]]] = {}
-    for number, line in lines[1:]:
-        cells = _cells(thing, name, number, line)
-        if len(cells) != len(head):
-            where = f'{name}: line {number}: {len(cells)} cells'
-            raise ConfigError(thing, where, f'the head of the file has {len(head)}')
-        throw = cells[at[THROW]] if THROW in at else Path(name).stem
+    for line, cells in table.rows():
+        throw = cells[at[THROW]] if THROW in at else Path(table.name).stem
+        if not throw:
+            raise ConfigError(f'{table.name}: line {line}: {THROW}', '', 'give the throw a name')
         of = rows.setdefault(throw, {})
         for instrument, columns in instruments.items():
             values = [cells[at[column]] for column in (TIME, *columns)]
             if all(values):
                 numbers = [
-                    _number(name, number, column, value)
+                    _number(table, line, column, value)
                     for column, value in zip((TIME, *columns), values, strict=True)
                 ]
                 of.setdefault(instrument, []).append(numbers)
     if not rows:
-        raise ConfigError(thing, name, 'no row has a measurement')
+        raise ConfigError(thing, table.name, 'no row has a measurement')
     arrays = {
         throw: {kind: np.array(numbers) for kind, numbers in of.items()}
         for throw, of in rows.items()
     }
-    return {
+    throws: dict[str, Columns] = {
         throw: {kind: (a[:, 0], a[:, 1:]) for kind, a in of.items()}
         for throw, of in arrays.items()
     }
+    known = {TIME, THROW, *(column for columns in instruments.values() for column in columns)}
+    return MeasuredThrows(throws, tuple(name for name in table.columns if name not in known))
 
 
-def _instruments(thing: str, name: str, head: list[str]) -> dict[str, tuple[str, ...]]:
-    """Return the columns of the instruments that a file has."""
+def label(throw: str) -> str:
+    """Return the name of a throw in a text: `throw 3` where the file has only a number."""
+    return f'throw {throw}' if throw.isdigit() else throw
+
+
+def _instruments(table: Table) -> dict[str, tuple[str, ...]]:
+    """Return the columns of the instruments that a file has.
+
+    Raises:
+        ConfigError: There is no time, no instrument, or an instrument in part.
+    """
+    head = set(table.columns)
     if TIME not in head:
-        raise ConfigError(thing, f'{name}: {", ".join(head)}', f'name the columns, {TIME} first')
-    if len(set(head)) < len(head):
-        raise ConfigError(thing, f'{name}: {", ".join(head)}', 'name each column once')
-    instruments = {kind: columns for kind, columns in GROUPS.items() if set(columns) <= set(head)}
-    if 'position' not in instruments and set(CAMERA_COLUMNS) <= set(head):
+        raise table.lacks(f'it needs a column {TIME}, the time in s', (TIME,), _KNOWN)
+    instruments = {kind: columns for kind, columns in GROUPS.items() if head.issuperset(columns)}
+    if 'position' not in instruments and head.issuperset(CAMERA_COLUMNS):
         instruments['camera'] = CAMERA_COLUMNS
+    for kind, columns in GROUPS.items():
+        missing = [column for column in columns if column not in head]
+        if missing and head.intersection(columns) and {kind, 'camera'}.isdisjoint(instruments):
+            needed = f'{kind} needs {", ".join(columns)}: it has no {", ".join(missing)}'
+            raise table.lacks(needed, missing, _KNOWN)
     if not instruments:
         groups = '; '.join(', '.join(columns) for columns in GROUPS.values())
-        raise ConfigError(thing, f'{name}: {", ".join(head)}', f'give columns of {groups}')
+        raise table.lacks(f'it needs columns of {groups}', _KNOWN[2:], _KNOWN)
     return instruments
 
 
-def _number(name: str, line: int, column: str, value: str) -> float:
+def _number(table: Table, line: int, column: str, cell: str) -> float:
     """Return a finite number, whose square is finite too."""
-    where = f'{name}: line {line}: {column}'
-    try:
-        number = float(value)
-    except ValueError:
-        number = float('nan')
-    if not abs(number) < _LARGEST:
-        raise ConfigError(where, value, 'give a finite number, or nothing')
+    number = table.number(cell)
+    if number is None or not abs(number) < _LARGEST:
+        where = f'{table.name}: line {line}: {column}'
+        raise ConfigError(where, cell, 'give a finite number, or nothing')
     return number
-
-
-def _cells(thing: str, name: str, number: int, line: str) -> list[str]:
-    """Return the cells of a line.
-
-    Raises:
-        ConfigError: It is no CSV, such as a cell of more than 131072 characters.
-    """
-    try:
-        return [cell.strip() for cell in next(csv.reader([line]))]
-    except csv.Error as error:
-        raise ConfigError(thing, f'{name}: line {number}', str(error)) from None

@@ -201,13 +201,14 @@ def test_rows_of_a_techdisc_are_launches(document, file):
 @pytest.mark.parametrize(
     ('old', 'new', 'fragments'),
     [
-        ('60,1080', '600,1080', ['line 2: speedMph: 600', '0 to 200 m/s']),
-        ('60,1080', 'fast,1080', ["line 2: speedMph: 'fast'", '0 to 200 m/s']),
+        ('60,1080', '600,1080', ['line 2: speedMph: 600', '0 to 447.387 mph']),
+        ('60,1080', 'fast,1080', ["line 2: speedMph: 'fast'", '0 to 447.387 mph']),
         ('60,1080', '60,', ["line 2: spinRpm: ''"]),
         ('FOREHAND', 'hammer', ["line 3: throwType: 'hammer'", 'rhbh', 'forehand']),
         (',4,FORE', ',90,FORE', ['line 3: wobbleAngle: 90', '0 to 60']),
-        ('spinRpm', 'spin', ['--techdisc', 'spinRpm']),
-        ('speedMph', 'speed', ['--techdisc', 'speedKmh']),
+        ('spinRpm', 'spin', ['throws.csv: columns', 'a column spinRpm']),
+        ('speedMph', 'speed', ['throws.csv: columns', 'speedKmh']),
+        ('speedMph', 'speedmph', ['throws.csv: columns', 'did you mean speedMph for speedmph?']),
         (TECHDISC[TECHDISC.index('\n') :], '\n', ['--techdisc', 'at least one throw']),
     ],
 )

@@ -104,7 +104,7 @@ def test_a_file_becomes_a_disc_a_report_and_a_document(throw, tmp_path, capsys):
         ),
         (['t_s', 'x_m', 'y_m'], [[0.1 * i, i, 0] for i in range(20)], '--camera-height'),
         (['x_m', 'y_m', 'z_m'], [[i, 0, 1] for i in range(9)], 't_s'),
-        (['t_s', 'a', 'b'], [[i, 0, 1] for i in range(9)], 'give columns of'),
+        (['t_s', 'a', 'b'], [[i, 0, 1] for i in range(9)], 'it needs columns of'),
         (
             ['t_s', 'p_rad_s', 'q_rad_s', 'r_rad_s'],
             [[0.01 * i, 1, 1, 3000] for i in range(20)],

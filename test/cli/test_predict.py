@@ -49,7 +49,34 @@ def test_each_throw_of_a_csv_has_its_own_clock(csv, tmp_path, capsys):
     assert predict.main([str(both), '--disc-uncertainty', '0', '--json']) == 0
     first, second = json.loads(capsys.readouterr().out)['throws']
     assert (first.pop('throw'), second.pop('throw')) == (1, 2)
+    assert (first.pop('name'), second.pop('name')) == ('a', 'b')
     assert first == second
+
+
+def test_a_throw_of_a_csv_that_is_not_recognised_is_named(csv, tmp_path, capsys):
+    """Later throws were numbered as if it were not in the file."""
+    file, _ = csv
+    head, *rows = file.read_text().splitlines()[:40]
+    still = [f'{i / 30},0,0,1' for i in range(30)]
+    both = tmp_path / 'both.csv'
+    lines = [f'{n},{row}' for n, of in (('1', still), ('2', rows)) for row in of]
+    both.write_text('\n'.join([f'throw,{head}', *lines]))
+    assert predict.main([str(both), '--disc-uncertainty', '0']) == 0
+    out, err = capsys.readouterr()
+    assert 'throw 2: measured from' in out
+    assert 'throw 1' not in out
+    assert 'throw 1: not recognised as a throw, 30 measurements' in err
+
+
+def test_the_samples_of_fly_are_measurements(tmp_path, capsys):
+    file = tmp_path / 'flown.csv'
+    assert fly.main(['--csv', str(file), '--samples', '30']) == 0
+    landing = re.search(r'landed .* at x ([\d.]+) m, y (-?[\d.]+) m', capsys.readouterr().out)
+    assert predict.main([str(file), '--disc', 'frisbee', '--throw-spin', '31', '--json']) == 0
+    out, err = capsys.readouterr()
+    (document,) = json.loads(out)['throws']
+    assert document['landing_m'] == pytest.approx([float(x) for x in landing.groups()], abs=0.1)
+    assert 'columns that are not read: velocity_x_m_s' in err
 
 
 def test_bag_of_the_simulator_gives_its_landing(capsys):
@@ -132,4 +159,4 @@ def test_measurements_without_a_throw_are_a_failure(tmp_path, capsys):
     file = tmp_path / 'still.csv'
     file.write_text('t_s,x_m,y_m,z_m\n' + ''.join(f'{i / 60},0,0,1\n' for i in range(60)))
     assert predict.main([str(file)]) == 1
-    assert 'no throw in 60 measurements' in capsys.readouterr().err
+    assert 'no throw in 60 measurements; are positions in m' in capsys.readouterr().err

@@ -34,7 +34,7 @@ def flown():
 
 @pytest.fixture(scope='module')
 def followed(flown):
-    (one,) = replay.replay([replay.measurements(flown.time, flown.position)], CONFIG)
+    (one,) = replay.replay({'': replay.measurements(flown.time, flown.position)}, CONFIG)
     return one
 
 
