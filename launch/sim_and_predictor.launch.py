@@ -19,7 +19,13 @@ from launch.actions import (
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
-from disc_sim_ros.ros.launch_arguments import argument_of, is_started_directly, refuse_unknown
+from disc_sim_ros.quantities import PREDICTOR_NODE
+from disc_sim_ros.ros.launch_arguments import (
+    argument_of,
+    is_started_directly,
+    number,
+    refuse_unknown,
+)
 from disc_sim_ros.ros.sim.parameters import TABLE
 
 ARGUMENTS = {
@@ -51,7 +57,7 @@ def predict_and_throw(context: LaunchContext) -> list[Node | ExecuteProcess]:
     known = [*ARGUMENTS, *OF_SIMULATOR, *(argument_of(spec.name) for spec in TABLE)]
     refuse_unknown(context.argv, known, direct=is_started_directly(__file__))
     arguments = context.launch_configurations
-    noise = float(arguments['noise'])
+    noise = number('noise', arguments['noise'], PREDICTOR_NODE['added_noise'])
     parameters = {
         'sources': 'odom',
         'added_noise': noise,

@@ -19,10 +19,17 @@ from launch.actions import (
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
-from disc_sim_ros.ros.launch_arguments import argument_of, is_started_directly, refuse_unknown
+from disc_sim_ros.ros.launch_arguments import (
+    argument_of,
+    is_started_directly,
+    number,
+    refuse_unknown,
+)
 from disc_sim_ros.ros.recorder.options import default_bag
 from disc_sim_ros.ros.sim.parameters import TABLE
+from disc_sim_ros.validation import Quantity
 
+THROW_AFTER = Quantity('throw_after', 's', -3600.0, 3600.0, 0.0, 'Time to the throw')
 ARGUMENTS = {
     'bag': ('', 'New folder for the bag; empty: bags/disc_DATE_TIME in the current folder.'),
     'throw_after': (
@@ -62,7 +69,7 @@ def record_and_throw(context: LaunchContext) -> list[Node | ExecuteProcess]:
         parameters=[{'bag': bag}],
         output='screen',
     )
-    wait = float(arguments['throw_after'])
+    wait = number('throw_after', arguments['throw_after'], THROW_AFTER)
     if wait < 0.0:
         return [recorder]
     program = [sys.executable, '-m', 'disc_sim_ros.ros.throw_when_ready']

@@ -64,7 +64,7 @@ def one(data: bytes) -> None:
         given = message if k == strange else _tracked(k, config.frame)
         kind = source if k == strange else 'point'
         try:
-            taken = measurement(kind, given, config, stamp_of(given) / 1e9)
+            taken = measurement(kind, given, config, stamp_of(kind, given) / 1e9)
         except ConfigError as error:
             if '\n' in str(error):
                 raise AssertionError(f'not one line: {error}') from None

@@ -6,6 +6,7 @@ from pathlib import Path
 import sys
 
 from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.validation import Quantity
 
 OWN = 'sim.'  # before parameters such as `model`, which other launch files have as arguments
 
@@ -13,6 +14,20 @@ OWN = 'sim.'  # before parameters such as `model`, which other launch files have
 def argument_of(parameter: str) -> str:
     """Return the launch argument of a parameter of sim_node: 'launch.speed', but 'sim.disc'."""
     return parameter if '.' in parameter else OWN + parameter
+
+
+def number(name: str, text: str, quantity: Quantity) -> float:
+    """Return the number that an argument states.
+
+    Raises:
+        ConfigError: It is no number, or out of the range of the quantity.
+    """
+    try:
+        value: float | str = float(text)
+    except ValueError:
+        value = text
+    checked: float = quantity.check(value, name)
+    return checked
 
 
 def is_started_directly(file: str) -> bool:

@@ -222,6 +222,23 @@ def test_the_throw_waits_for_the_recorder(load):
     assert len(module.record_and_throw(given)) == 1
 
 
+@pytest.mark.parametrize('value', ['abc', 'nan', '5000', ''])
+@pytest.mark.parametrize(
+    ('file', 'make', 'name'),
+    [
+        ('sim_and_recorder.launch.py', 'record_and_throw', 'throw_after'),
+        ('sim_and_predictor.launch.py', 'predict_and_throw', 'noise'),
+    ],
+)
+def test_a_bad_number_is_refused_in_one_line(load, file, make, name, value):
+    """`noise:=abc` ended in 'could not convert string to float', nan reached the nodes."""
+    module = load(file)
+    both = [context(module), context(load('sim.launch.py'))]
+    merged = both[1].launch_configurations | both[0].launch_configurations | {name: value}
+    with pytest.raises(ConfigError, match=rf'^{name}: .*{value}.* [-\d]+ to \d+ [ms]$'):
+        getattr(module, make)(SimpleNamespace(launch_configurations=merged, argv=[]))
+
+
 @pytest.mark.parametrize('word', ['launch.sped:=20', 'disc:=wraith', 'sim.modell:=exact'])
 def test_misspelt_arguments_are_refused_with_the_nearest_name(word):
     name = word.partition(':=')[0]

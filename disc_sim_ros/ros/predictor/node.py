@@ -73,6 +73,7 @@ class PredictorNode(Node):
         self._last_ellipse = -np.inf
         self._throw = 0
         self._measured_at = time.monotonic()
+        self._flies_on = 0.0  # s from the last prediction to its landing
         self._covariance = np.full((3, 3), np.nan)
         self._likely: dict[str, float] = {}  # weight of each disc, by its name
         self.predictions = self.refused = 0
@@ -137,10 +138,10 @@ class PredictorNode(Node):
         return False
 
     def _add(self, source: str, message: Any) -> bool:
-        stamp = stamp_of(message)
-        if self._epoch is None:
-            self._epoch = stamp
         try:
+            stamp = stamp_of(source, message)
+            if self._epoch is None:
+                self._epoch = stamp
             m = measurement(source, message, self._config, (stamp - self._epoch) / NANOSECONDS)
             if self._config.added_noise > 0.0:
                 x, y, z = np.add(m.position, self._noise.normal(0.0, self._config.added_noise, 3))
@@ -159,6 +160,7 @@ class PredictorNode(Node):
             return
         self._publish(prediction)
         self.predictions += 1
+        self._flies_on = prediction.landing_time - prediction.time
         if prediction.throw != self._throw:
             self._throw = prediction.throw
             self.get_logger().info(f'throw {self._throw}: following')
@@ -201,6 +203,8 @@ class PredictorNode(Node):
         silent = time.monotonic() - self._measured_at
         if silent < SILENCE:
             return True, 'following a throw'
+        if silent > self._flies_on + SILENCE:
+            return True, 'waiting for a throw: the last one must have landed'
         return False, f'in a throw of which nothing was measured for {silent:.1f} s'
 
     def _publish_diagnostics(self) -> None:

@@ -23,7 +23,7 @@ from disc_sim_ros.estimation.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.ros.predictor import outputs
-from disc_sim_ros.ros.predictor.measured import measurement
+from disc_sim_ros.ros.predictor.measured import measurement, stamp_of
 from disc_sim_ros.ros.predictor.node import PredictorNode
 from disc_sim_ros.ros.predictor.options import node_config
 from disc_sim_ros.ros.qos import STATE_QOS
@@ -108,6 +108,38 @@ def test_covariance_gives_the_standard_deviation():
     assert measurement(
         'pose_with_covariance', m, node_config({}), 0.0
     ).position_sigma == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize('variance', [0.0, -1.0, math.nan])
+def test_a_covariance_that_says_nothing_leaves_position_sigma(variance):
+    m = PoseWithCovarianceStamped()
+    m.pose.covariance[0] = m.pose.covariance[7] = m.pose.covariance[14] = variance
+    assert measurement('pose_with_covariance', m, node_config({}), 0.0).position_sigma is None
+
+
+@pytest.mark.parametrize('variance', [101.0, 1e6, math.inf])
+def test_a_position_that_may_be_anywhere_is_refused(variance):
+    """A tracker that had lost the disc was believed to `position_sigma`: no throw was followed."""
+    m = PoseWithCovarianceStamped()
+    m.pose.covariance[0] = m.pose.covariance[7] = m.pose.covariance[14] = variance
+    with pytest.raises(
+        ConfigError, match=r'covariance: .* up to 100 m\^2, or 0 for position_sigma'
+    ):
+        measurement('pose_with_covariance', m, node_config({}), 0.0)
+
+
+def test_an_orientation_that_is_not_finite_is_refused():
+    m = pose(1.0, (0.0, 0.0, 1.0))
+    m.pose.orientation.x = math.nan
+    with pytest.raises(ConfigError, match=r'pose orientation: .* where there is no attitude'):
+        measurement('pose', m, node_config({}), 0.0)
+
+
+def test_a_message_without_a_time_is_refused():
+    """All were late or repeated, and the node went on to wait for a throw without a word."""
+    with pytest.raises(ConfigError, match=r'pose header.stamp: 0 .* time of the measurement'):
+        stamp_of('pose', pose(0.0, (0.0, 0.0, 1.0)))
+    assert stamp_of('pose', pose(1e-9, (0.0, 0.0, 1.0))) == 1
 
 
 def straight_path() -> Path:
@@ -240,6 +272,8 @@ def test_a_throw_whose_measurements_end_is_not_followed(ros_context):
         tracking.spin_until(lambda: tracking.node.predictions > 3)
         text = 'in a throw of which nothing was measured for '
         tracking.spin_until(lambda: says(text, DiagnosticStatus.WARN))
+        text = 'waiting for a throw: the last one must have landed'
+        tracking.spin_until(lambda: says(text, DiagnosticStatus.OK))
     finally:
         tracking.end()
 
