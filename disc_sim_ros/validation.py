@@ -1,6 +1,6 @@
 """Checks of values from users: each returns the clean value or raises an error of one line."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sized
 from dataclasses import dataclass, replace
 import math
 from numbers import Real
@@ -195,6 +195,34 @@ def text(thing: str, value: object) -> str:
     if line is None or not line.isprintable():
         raise ConfigError(thing, value, 'give a text without control characters')
     return line
+
+
+def instance(thing: str, value: object, kind: type, such_as: str) -> None:
+    """Refuse an argument of another type.
+
+    Args:
+        thing: Name of the argument.
+        value: The argument.
+        kind: Its type.
+        such_as: An expression that makes one.
+
+    Raises:
+        ConfigError: It is of another type.
+    """
+    if not isinstance(value, kind):
+        raise ConfigError(
+            thing, value, f'it must be of the type {kind.__name__}, such as {such_as}'
+        )
+
+
+def vector(thing: str, value: object, count: int = 3) -> None:
+    """Refuse what does not hold `count` components; their ranges are checked elsewhere.
+
+    Raises:
+        ConfigError: It has no length, or another one.
+    """
+    if isinstance(value, str) or not isinstance(value, Sized) or len(value) != count:
+        raise ConfigError(thing, value, f'give {count} numbers')
 
 
 def column(thing: str, values: object, *, least: int = 2) -> NDArray[np.float64]:

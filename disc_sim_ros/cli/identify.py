@@ -167,6 +167,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     )
     noise, free = identify_input.noise(chosen), identify_input.free(chosen)
     throws = identify_input.throws(chosen, setup)
+    identify_input.refuse_unused(chosen, noise, throws)
     # Imported once the input is known to be right: they take a second.
     from disc_sim_ros.estimation import crossvalidation, identification, report  # noqa: PLC0415
     from disc_sim_ros.physics import sampled  # noqa: PLC0415

@@ -51,8 +51,8 @@ def throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
                 raise ConfigError('throws', source, 'it is given twice')
             measured[full] = {k: v for k, v in columns.items() if k in {*used, 'camera'}}
             if not measured[full]:
-                allowed = f'it has {", ".join(columns) or "nothing"}, --use {",".join(used)}'
-                raise ConfigError('throws', full, allowed)
+                allowed = f'it has {", ".join(columns) or "no measurement"}, not {", ".join(used)}'
+                raise ConfigError('throws', full, f'{allowed} (--use)')
     check_different(measured)
     releases = _releases(chosen, len(measured))
     return [
@@ -84,6 +84,25 @@ def _releases(
     return [(row.release, errors) for row in rows]
 
 
+def refuse_unused(
+    chosen: argparse.Namespace, noise: 'Mapping[str, float]', throws: 'Sequence[Throw]'
+) -> None:
+    """Refuse flags about instruments that measured no throw.
+
+    Raises:
+        ConfigError: There is one, such as `--accelerometer-range` without `--use acceleration`.
+    """
+    kinds = {o.kind: None for throw in throws for o in throw.observations}  # in their order
+    about = {f'--noise {kind}': (kind, value) for kind, value in noise.items()}
+    for name, kind in (('camera_height', 'camera'), ('accelerometer_range', 'acceleration')):
+        if hasattr(chosen, name):
+            about[f'--{name.replace("_", "-")}'] = kind, getattr(chosen, name)
+    for flag, (kind, value) in about.items():
+        if kind not in kinds:
+            allowed = f'these throws use {", ".join(kinds)}, not {kind}'
+            raise ConfigError(flag, value, allowed)
+
+
 def free(chosen: argparse.Namespace) -> list[str] | None:
     """Return the coefficients of `--free`, checked before anything is compiled."""
     from disc_sim_ros.estimation import coefficients  # noqa: PLC0415
@@ -102,6 +121,8 @@ def noise(chosen: argparse.Namespace) -> dict[str, float]:
     for word in _listed(chosen, 'noise') or []:
         name, _, number = word.partition('=')
         validation.choice('--noise', name, NOISE)
+        if name in of_each:
+            raise ConfigError('--noise', name, 'name each instrument once')
         try:
             value: float | str = float(number)
         except ValueError:

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import lanes, local, throw_detection
@@ -98,8 +99,11 @@ class Measurement:
     def __post_init__(self) -> None:
         if not math.isfinite(self.time):
             raise ConfigError('measured time', self.time, 'give a finite number')
+        validation.vector('measured position', self.position)
         for name, value in zip('xyz', self.position, strict=True):
             POSITION.check(value, f'measured {name}')
+        if self.axis is not None:
+            validation.vector('measured axis', self.axis)
         if self.axis is not None and not (math.isfinite(n := math.hypot(*self.axis)) and n > 0.0):
             raise ConfigError('measured axis', self.axis, 'give a finite direction')
         if self.position_sigma is not None:

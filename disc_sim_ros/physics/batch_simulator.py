@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import frames
-from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup
+from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup, check_setup
 from disc_sim_ros.physics.kernels import step_batch
 from disc_sim_ros.physics.kernels.integrator import LANDED, LOST
 from disc_sim_ros.physics.kernels.jit import COMPILED, note_before
@@ -52,6 +52,7 @@ class BatchSimulator:
         Raises:
             ConfigError: The wind has turbulence, or a number is below 1.
         """
+        check_setup(setup)
         if setup.wind.turbulence > 0.0:
             raise ConfigError('turbulence', setup.wind.turbulence, 'batches fly without gusts')
         for name, value in (('count', count), ('threads', threads)):

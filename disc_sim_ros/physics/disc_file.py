@@ -12,6 +12,7 @@ import difflib
 import functools
 from importlib.resources import files
 import math
+import os
 from pathlib import Path
 import re
 from typing import Any
@@ -74,17 +75,21 @@ def disc_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in files if path.suffix == '.yaml'))
 
 
-def load_disc(name_or_file: str) -> Disc:
+def load_disc(name_or_file: str | os.PathLike[str]) -> Disc:
     """Return a disc of the catalogue, one from a user's YAML file, or one from flight numbers.
 
     Args:
-        name_or_file: A name of `disc_names`, a path that ends in .yaml or .yml, or flight numbers
-            such as '11/5/-1/3'.
+        name_or_file: A name of `disc_names`, the path of a file that ends in .yaml or .yml, or
+            flight numbers such as '11/5/-1/3'.
 
     Raises:
         ConfigError: No such disc or file, or a file that does not describe a disc; the message
             names the file, the key and what is allowed.
     """
+    if isinstance(name_or_file, os.PathLike):
+        name_or_file = os.fspath(name_or_file)
+    if not isinstance(name_or_file, str):
+        raise ConfigError('disc', name_or_file, "give a text, such as 'frisbee'")
     if is_file(name_or_file):
         path = Path(name_or_file)
         source = _shown(name_or_file)

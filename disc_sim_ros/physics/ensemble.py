@@ -126,6 +126,9 @@ def fly_many(
         ConfigError: A name is unknown, shapes differ, a value is out of range or the step is too
             long for a flight; it names the first such flight.
     """
+    if not hasattr(launches, 'items'):  # a table of pandas has them too
+        raise ConfigError('launches', launches, "give columns, such as {'speed': [17.0, 18.0]}")
+    flight.check_setup(setup)
     DURATION.check(duration)
     control = flight.checked_control(control)
     columns = _checked_columns(launches, setup, control, ground=ground)

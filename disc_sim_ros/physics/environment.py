@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from disc_sim_ros import validation
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.quantities import AIR, MEAN_WIND, WIND
 
@@ -47,6 +48,7 @@ class Wind:
     seed: int = WIND['gust_seed'].default
 
     def __post_init__(self) -> None:
+        validation.vector('wind', self.mean)
         for axis, quantity, speed in zip('XYZ', MEAN_WIND.values(), self.mean, strict=True):
             quantity.check(speed, f'wind {axis}')
         for name in ('roughness_length', 'reference_height', 'turbulence'):

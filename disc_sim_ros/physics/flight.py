@@ -75,6 +75,9 @@ class Setup:
     ground_contact: str | None = None
 
     def __post_init__(self) -> None:
+        validation.instance('disc', self.disc, Disc, "load_disc('frisbee')")
+        validation.instance('air', self.air, Air, 'Air(density=1.2)')
+        validation.instance('wind', self.wind, Wind, 'Wind(mean=(2.0, 0.0, 0.0))')
         if self.model != SLOWING:
             validation.choice('model', self.model, MODELS)
         validation.choice('moment_axes', self.moment_axes, MOMENT_AXES)
@@ -317,6 +320,15 @@ _of_thread = _OfThread()
 _NO_SAMPLES = np.empty((0, COLUMNS))
 
 
+def check_setup(setup: Setup) -> None:
+    """Refuse what is no Setup.
+
+    Raises:
+        ConfigError: It is something else.
+    """
+    validation.instance('setup', setup, Setup, "Setup(disc=load_disc('frisbee'))")
+
+
 def check_flight(
     launch: Launch, setup: Setup, duration: float, *, ground: bool, sample_rate: float
 ) -> int:
@@ -325,6 +337,8 @@ def check_flight(
     Raises:
         ConfigError: As `fly`.
     """
+    validation.instance('launch', launch, Launch, 'Launch(speed=18.0)')
+    check_setup(setup)
     DURATION.check(duration)
     SAMPLE_RATE.check(sample_rate)
     setup.check_step(launch.spin, launch.speed)

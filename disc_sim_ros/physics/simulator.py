@@ -7,11 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import disc_file, frames
 from disc_sim_ros.physics.environment import Wind
-from disc_sim_ros.physics.flight import NO_CONTROL, NO_NOISE, Setup, checked_control, lost
+from disc_sim_ros.physics.flight import (
+    NO_CONTROL,
+    NO_NOISE,
+    Setup,
+    check_setup,
+    checked_control,
+    lost,
+)
 from disc_sim_ros.physics.kernels import integrator
 from disc_sim_ros.physics.kernels.equations import Control, Plant, State, Velocity
 from disc_sim_ros.physics.kernels.integrator import (
@@ -52,6 +60,8 @@ class FlightSimulator:
         Raises:
             ConfigError: The release is underground, or the step too long for the spin.
         """
+        check_setup(setup)
+        validation.instance('release', release, State, 'Launch(speed=18.0).state()')
         setup.check_step(release.r, math.hypot(release.VX, release.VY, release.VZ))
         if ground:
             require_above_ground(frames.flip(release.Z))
