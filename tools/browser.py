@@ -73,7 +73,10 @@ class Browser:
                 'about:blank',
             ],
             pass_fds=(to_read, to_write),
-            env={**os.environ, 'IN': str(to_read), 'OUT': str(to_write)},
+            env={
+                **os.environ, 'IN': str(to_read), 'OUT': str(to_write),
+                'TMPDIR': self._folder,  # killed, it leaves the folder of its socket there
+            },
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
@@ -125,7 +128,11 @@ class Browser:
         self._process.wait(_DEADLINE)
         with suppress(OSError):
             os.close(self._from)
-        shutil.rmtree(self._folder, ignore_errors=True)
+        deadline = time.monotonic() + _DEADLINE
+        while Path(self._folder).exists() and time.monotonic() < deadline:
+            # Its other processes write until the signal has reached them.
+            shutil.rmtree(self._folder, ignore_errors=True)
+            time.sleep(0.01)
 
     def send(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Send a command and return its result.

@@ -57,7 +57,8 @@ def processes(workers: int) -> Iterator[Executor]:
     """Yield an executor of new processes, which ignore Ctrl-C and end with this process."""
     # Not forked: a forked process cannot use the threads and locks of numba.
     context = multiprocessing.get_context('spawn')
-    pool = _Processes(workers, mp_context=context, initializer=_begin_worker)
+    with ctrl_c_waits():  # a semaphore that is made and not yet owned would stay behind
+        pool = _Processes(workers, mp_context=context, initializer=_begin_worker)
     try:
         yield pool
     finally:

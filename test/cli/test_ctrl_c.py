@@ -78,6 +78,30 @@ def test_ctrl_c_in_an_import_waits_also_for_workers_that_start_after_it(tmp_path
     assert code in ENDED
 
 
+def test_ctrl_c_while_the_executor_is_made_leaves_no_semaphore(program, tmp_path):
+    """multiprocessing would remove it in the end, and warn on stderr."""
+    path = tmp_path / 'semaphores.py'
+    path.write_text(
+        """
+from multiprocessing import resource_tracker
+import signal
+
+register = resource_tracker.register
+
+def interrupted(*what):
+    register(*what)
+    signal.raise_signal(signal.SIGINT)
+
+resource_tracker.register = interrupted
+"""
+        + program.read_text(encoding='utf-8'),
+        encoding='utf-8',
+    )
+    done = subprocess.run([sys.executable, path], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ('ready\n', '')
+    assert done.returncode in ENDED
+
+
 def test_the_program_ends_as_usual_without_ctrl_c(program):
     done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ('ready\ndone\n', '')

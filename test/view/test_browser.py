@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+import tempfile
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
@@ -170,14 +172,18 @@ def test_zz_the_console_is_empty_and_no_host_was_asked(opened):
     assert [r for r in opened.requests if not r.startswith(('file:', 'data:'))] == []
 
 
-def test_the_browser_of_the_tests_reports_problems(tmp_path):
+def test_the_browser_of_the_tests_reports_problems_and_leaves_nothing(tmp_path, monkeypatch):
     path = tmp_path / 'bad.html'
     path.write_text(
         '<script>console.error("planted"); setTimeout(() => { throw Error("thrown"); });</script>'
     )
-    with browser.Browser(300, 300) as tab:
-        tab.open(path)
-        tab.value(TWO_FRAMES)
-        text = '\n'.join(tab.problems)
+    with TemporaryDirectory() as folder:  # the path of the browser's socket has to be short
+        monkeypatch.setenv('TMPDIR', folder)
+        monkeypatch.setattr(tempfile, 'tempdir', folder)
+        with browser.Browser(300, 300) as tab:
+            tab.open(path)
+            tab.value(TWO_FRAMES)
+            text = '\n'.join(tab.problems)
+        assert list(Path(folder).iterdir()) == []
     assert 'planted' in text
     assert 'thrown' in text

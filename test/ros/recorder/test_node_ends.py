@@ -34,8 +34,8 @@ def test_a_killed_recorder_costs_at_most_the_last_second(ros, record, tmp_path):
     kill_times = []
     for recorder in recorders:
         counter.publish(570, rate=1000.0)
-        recorder.process.kill()
         kill_times.append(time.monotonic())
+        recorder.process.kill()
     for recorder, kill_time in zip(recorders, kill_times, strict=True):
         recorder.wait()
         recorded = counts(recorder.bag, '/count')
