@@ -5,7 +5,8 @@ descriptors 3 and 4 of the browser (`--remote-debugging-pipe`).
 """
 
 import base64
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 import json
 import os
 from pathlib import Path
@@ -101,8 +102,19 @@ class Browser:
         for domain in ('Page', 'Runtime', 'Log', 'Network'):
             self.send(f'{domain}.enable')
 
-    def show_as(self, width: int, height: int, *, phone: bool = False, dark: bool = False) -> None:
-        """Be a window of this size, or the screen of a phone; forget problems and requests."""
+    def show_as(
+        self, width: int, height: int, *,
+        phone: bool = False, dark: bool = False, still: bool = False,
+    ) -> None:  # fmt: skip
+        """Be a window of this size, or the screen of a phone; forget problems and requests.
+
+        Args:
+            width: Of the page [CSS px].
+            height: Of the page [CSS px].
+            phone: It is touched, and has four pixels for each of CSS.
+            dark: The reader prefers dark pages.
+            still: The reader prefers pages that do not move by themselves.
+        """
         self.problems.clear()
         self.requests.clear()
         self.send(
@@ -111,7 +123,8 @@ class Browser:
         )  # fmt: skip
         self.send('Emulation.setTouchEmulationEnabled', enabled=phone)
         scheme = {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}
-        self.send('Emulation.setEmulatedMedia', features=[scheme])
+        motion = {'name': 'prefers-reduced-motion', 'value': 'reduce' if still else ''}
+        self.send('Emulation.setEmulatedMedia', features=[scheme, motion])
 
     def __enter__(self) -> Self:
         return self
@@ -189,9 +202,12 @@ class Browser:
             case 'Network.requestWillBeSent':
                 self.requests.append(values['request']['url'][:200])
 
-    def before(self, script: str) -> None:
-        """Run a script in each page that is opened from now on, before its own."""
-        self.send('Page.addScriptToEvaluateOnNewDocument', source=script)
+    @contextmanager
+    def before(self, script: str) -> Iterator[None]:
+        """Run a script in each page that is opened in this block, before its own."""
+        added = self.send('Page.addScriptToEvaluateOnNewDocument', source=script)
+        yield
+        self.send('Page.removeScriptToEvaluateOnNewDocument', identifier=added['identifier'])
 
     def open(self, address: Path | str) -> None:
         """Open a file or an address, and wait until the document is loaded."""

@@ -10,5 +10,5 @@ import browser
 @pytest.fixture(scope='session')
 def chromium() -> Iterator[browser.Browser]:
     """A browser, to show pages one after the other: its start takes as long as their tests."""
-    with browser.Browser(1100, 700) as tab:
+    with browser.Browser(900, 500) as tab:
         yield tab

@@ -1,6 +1,6 @@
 """A page in a real browser: the disc flies and spins, at the size of a desktop and of a phone."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -26,7 +26,7 @@ pytestmark = [
 ]
 METRIC = SYSTEMS['metric']
 RATE = 200.0
-SIZES = {'desktop': (1100, 700, False), 'phone': (390, 844, True)}
+SIZES = {'desktop': (900, 500, False), 'phone': (390, 844, True)}
 TWO_FRAMES = 'new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r())))'
 
 
@@ -49,10 +49,16 @@ def file(flights, tmp_path_factory):
 
 
 @contextmanager
-def shown_at(tab: browser.Browser, size: str, file: Path) -> Iterator[browser.Browser]:
-    """Open a page of flights in a window of one of the SIZES; a phone is dark."""
+def shown_at(
+    tab: browser.Browser, size: str, file: Path, *, still: bool = True
+) -> Iterator[browser.Browser]:
+    """Open a page of flights in a window of one of the SIZES; a phone is dark.
+
+    Each picture that the page draws takes half a second of a core. If `still`, the page does not
+    play by itself.
+    """
     width, height, phone = SIZES[size]
-    tab.show_as(width, height, phone=phone, dark=phone)
+    tab.show_as(width, height, phone=phone, dark=phone, still=still)
     tab.open(file)
     tab.wait('discView.ready')
     yield tab
@@ -61,8 +67,14 @@ def shown_at(tab: browser.Browser, size: str, file: Path) -> Iterator[browser.Br
 
 @pytest.fixture(scope='module', params=SIZES)
 def opened(request, file, chromium):
-    with shown_at(chromium, request.param, file) as tab:
+    with shown_at(chromium, request.param, file, still=False) as tab:
         yield tab
+
+
+def poses(tab, which: int, times: Sequence[float]) -> list[dict]:
+    """Return where a page has a disc at some times, of which it draws the last."""
+    each = f'(time => (discView.play(false), discView.seek(time), discView.pose({which})))'
+    return tab.value(f'{[float(time) for time in times]}.map{each}')
 
 
 def picture(tab, time: float, camera: str) -> np.ndarray:
@@ -78,8 +90,9 @@ def picture(tab, time: float, camera: str) -> np.ndarray:
 
 
 def test_the_page_plays_by_itself_and_stops_at_the_end(opened):
-    opened.value('discView.seek(0), discView.play(true)')
+    """First in this file: the page has just been opened."""
     opened.wait('discView.time > 0.2')
+    assert opened.value('discView.playing')
     opened.value('discView.seek(discView.duration() - 0.1)')
     opened.wait('!discView.playing')
     assert opened.value('discView.time') == opened.value('discView.duration()')
@@ -113,15 +126,12 @@ def test_the_picture_shows_the_disc_spin(opened):
 def test_the_pose_between_two_samples_is_that_of_a_finer_flight(opened, flights, which):
     flown = flights[which]
     fine = fly(flown.launch, flown.setup, sample_rate=10.0 * RATE).trajectory
-    for k in (17, 4321, 5555):
-        opened.value(f'discView.seek({fine.t[k]})')
-        shown = opened.value(f'discView.pose({which})')
-        assert shown['position'] == pytest.approx(
-            frames.map_from_paper(fine.position[k]), abs=1e-3
-        )
+    places = [17, 4321, 5555]
+    for k, pose in zip(places, poses(opened, which, fine.t[places]), strict=True):
+        assert pose['position'] == pytest.approx(frames.map_from_paper(fine.position[k]), abs=1e-3)
         despun = Rotation.from_quat(frames.message_quaternion(fine.attitude[k]))
         expected = despun * Rotation.from_euler('z', -fine.spin_angle[k])
-        error = (Rotation.from_quat(shown['attitude']) * expected.inv()).magnitude()
+        error = (Rotation.from_quat(pose['attitude']) * expected.inv()).magnitude()
         # Chords of the wobble of the wraith, 39 Hz with 7 degrees, in steps of 5 ms.
         assert error < (0.002, 0.02)[which]
 
@@ -157,19 +167,20 @@ def test_the_theme_follows_the_system_and_the_button(opened):
     assert abs(int(light.sum()) - int(dark.sum())) > 200
 
 
-def test_without_webgl_the_curves_stay(file):
-    with browser.Browser(800, 600) as tab:
-        tab.before('HTMLCanvasElement.prototype.getContext = () => null;')
-        tab.open(file)
-        tab.wait('document.querySelector("#view p") !== null')
-        assert 'no WebGL' in tab.value('document.querySelector("#view").textContent')
-        assert tab.value('document.querySelectorAll("figure svg path").length') == 12
-
-
 def test_zz_the_console_is_empty_and_no_host_was_asked(opened):
     """Last in this file: the other tests have used the page."""
     assert opened.problems == []
     assert [r for r in opened.requests if not r.startswith(('file:', 'data:'))] == []
+
+
+def test_without_webgl_the_curves_stay(file, chromium):
+    chromium.show_as(800, 600)
+    with chromium.before('HTMLCanvasElement.prototype.getContext = () => null;'):
+        chromium.open(file)
+        chromium.wait('document.querySelector("#view p") !== null')
+        assert 'no WebGL' in chromium.value('document.querySelector("#view").textContent')
+        assert chromium.value('document.querySelectorAll("figure svg path").length') == 12
+    chromium.open('data:text/html,')
 
 
 def test_the_browser_of_the_tests_reports_problems_and_leaves_nothing(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.physics.launch import Launch
-from view.test_browser import SIZES, shown_at
+from view.test_browser import SIZES, poses, shown_at
 
 pytest.importorskip('trimesh')
 pytestmark = [
@@ -46,7 +46,6 @@ def test_the_fitted_flight_flies_past_the_measured_points(file, trajectory, size
     """The noise is far below a centimetre, so the fit is within one of the true positions."""
     places = map_from_paper(trajectory.position)
     with shown_at(chromium, size, file) as tab:
-        for k in (10, 60):
-            tab.value(f'discView.play(false), discView.seek({trajectory.t[k]})')
-            assert tab.value('discView.pose(0)')['position'] == pytest.approx(places[k], abs=0.01)
+        for k, pose in zip((10, 60), poses(tab, 0, trajectory.t[[10, 60]]), strict=True):
+            assert pose['position'] == pytest.approx(places[k], abs=0.01)
         assert tab.problems == []
