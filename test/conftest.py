@@ -11,11 +11,15 @@ import pytest
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'  # read when a message is first imported
+# Read when numpy is first imported, here and in hundreds of programs: its threads wait for work in
+# a loop, and to start them takes a third of the time of the import. The matrices here are small.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 IN_REAL_TIME, IN_BACKGROUND = 0, 10  # niceness
 FIRST = {  # the files of the first group
-    'sim/test_node_control', 'sim/test_node_input', 'sim/test_node_process', 'recorder/test_node',
-    'ros/test_parameters', 'ros/test_parameters_of_a_node',
+    'cli/test_demo', 'live/test_live_view', 'sim/test_node_control', 'sim/test_node_input',
+    'sim/test_node_process', 'recorder/test_node', 'ros/test_parameters',
+    'ros/test_parameters_of_a_node',
 }  # fmt: skip
 
 

@@ -24,12 +24,12 @@ INSIDE = 4.605  # of 90 % of two normal numbers
 def follow(
     measurements: list[Measurement], until: float, config: PredictorConfig = CONFIG
 ) -> Prediction:
-    """Return the prediction after the measurements up to `until`, an update for every fourth."""
+    """Return the prediction after the measurements up to `until`, an update for every eighth."""
     predictor, prediction = Predictor(config), None
     sights = [m for m in measurements if m.time <= until]
     for k, m in enumerate(sights):
         predictor.add(m)
-        if k < 12 or k % 4 == 0 or m is sights[-1]:  # a computer that is late
+        if k < 12 or k % 8 == 0 or m is sights[-1]:  # a computer that is late
             prediction = predictor.update(ellipse=m is sights[-1]) or prediction
     assert prediction is not None
     return prediction

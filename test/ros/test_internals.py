@@ -202,7 +202,8 @@ def test_overrides_of_parameters_are_found_before_they_are_declared(ros_context,
 @pytest.mark.parametrize('removed', rclpy_without.PARTS)
 def test_simulator_and_recorder_work_without_a_private_part(ros, tmp_path, removed):
     before = rclpy_without.without(removed)
-    parameters = {'auto_throw': False, 'launch.height': 3, 'command_timeout': 5.0}
+    short = {'launch.height': 0.5, 'launch.pitch': -2.0}  # of half a second
+    parameters = {'auto_throw': False, 'command_timeout': 5.0} | short
     latched = ros.node.create_publisher(Int64, 'latched', LATCHED)
     latched.publish(Int64(data=7))
     counter = Counter(ros, 'count')

