@@ -16,7 +16,7 @@ WORDS = {
     sweep: ('--vary', 'pitch=0:20:5', '--scatter', 'speed=1', '--scatter', 'spin=2', '--count',
             '5', '--seed', '1'),
     optimise: ('--for', 'accuracy', '--target', '20', '3', '--scatter', 'speed=0.5', '--count',
-               '5', '--seed', '1'),
+               '5', '--seed', '1', '--pitch', '12', '--roll', '5', '--yaw', '-20'),
 }  # fmt: skip
 
 
