@@ -23,9 +23,9 @@ import time
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.predictor import STEP, Predictor, PredictorConfig
-from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets, disc_shape
-from disc_sim_ros.estimation.throw_fit import (
+from disc_sim_ros.estimation.prediction.predictor import STEP, Predictor, PredictorConfig
+from disc_sim_ros.estimation.prediction.prior import Gaussian, ThrowPrior, disc_offsets, disc_shape
+from disc_sim_ros.estimation.prediction.throw_fit import (
     POSITION,
     Estimate,
     Measurements,

@@ -17,8 +17,8 @@ import time
 
 import numpy as np
 
-from disc_sim_ros.estimation.predictor import Measurement, Predictor, PredictorConfig
-from disc_sim_ros.estimation.prior import ThrowPrior, disc_offsets
+from disc_sim_ros.estimation.prediction.predictor import Measurement, Predictor, PredictorConfig
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior, disc_offsets
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 

@@ -7,7 +7,7 @@ import multiprocessing
 
 import numpy as np
 
-from disc_sim_ros.estimation.predictor import Predictor, PredictorConfig
+from disc_sim_ros.estimation.prediction.predictor import Predictor, PredictorConfig
 from disc_sim_ros.physics import disc_file, flight, simulator
 from disc_sim_ros.physics.batch_simulator import BatchSimulator
 from disc_sim_ros.physics.ensemble import fly_many

@@ -37,7 +37,7 @@ KERNELS = Path(__file__).parents[2] / 'disc_sim_ros/physics/kernels'
 COMPILED = (
     *(f'disc_sim_ros.physics.kernels.{path.stem}' for path in KERNELS.glob('*.py')),
     'disc_sim_ros.physics.sampled',
-    'disc_sim_ros.estimation.lanes',
+    'disc_sim_ros.estimation.prediction.lanes',
 )
 INSTRUMENTED = ('disc_sim_ros', 'mcap', 'mcap_ros2')  # and what a target names beside
 MORE_INSTRUMENTED = {'disc_files': ('yaml',)}  # it makes all else ten times slower

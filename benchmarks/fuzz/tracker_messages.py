@@ -10,7 +10,7 @@ import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import Predictor
+from disc_sim_ros.estimation.prediction.predictor import Predictor
 from disc_sim_ros.ros.predictor.measured import measurement, stamp_of
 from disc_sim_ros.ros.predictor.options import node_config
 

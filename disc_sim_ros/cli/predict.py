@@ -21,8 +21,8 @@ from disc_sim_ros.units import NANOSECONDS, SYSTEMS, System
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from disc_sim_ros.estimation.predictor import Measurement, PredictorConfig
-    from disc_sim_ros.estimation.replay import FollowedThrow
+    from disc_sim_ros.estimation.prediction.predictor import Measurement, PredictorConfig
+    from disc_sim_ros.estimation.prediction.replay import FollowedThrow
 
 _STALE = 0.1  # s; a prediction that is older than its row is told
 WATCHED = (0.3, 0.5, 1.0, 1.5, 2.0)  # s, rows of the summary
@@ -73,8 +73,8 @@ def main(arguments: Sequence[str] | None = None, prog: str = 'predict') -> int:
 
 
 def _run(chosen: argparse.Namespace) -> int:
-    from disc_sim_ros.estimation.predictor import first_call_note  # noqa: PLC0415 - not for --help
-    from disc_sim_ros.estimation.replay import replay  # noqa: PLC0415
+    from disc_sim_ros.estimation.prediction.predictor import first_call_note  # noqa: PLC0415 - not for --help
+    from disc_sim_ros.estimation.prediction.replay import replay  # noqa: PLC0415
 
     plot = getattr(chosen, 'plot', None)
     config, system = _config(chosen), SYSTEMS[chosen.units]
@@ -120,7 +120,7 @@ def _write_page(
 
 
 def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
-    from disc_sim_ros.estimation.predictor_options import predictor_config  # noqa: PLC0415
+    from disc_sim_ros.estimation.prediction.predictor_options import predictor_config  # noqa: PLC0415
     from disc_sim_ros.physics.environment import Wind  # noqa: PLC0415
     from disc_sim_ros.physics.flight import Setup  # noqa: PLC0415
     from disc_sim_ros.physics.frames import flip_yz  # noqa: PLC0415
@@ -133,7 +133,8 @@ def _config(chosen: argparse.Namespace) -> 'PredictorConfig':
 
 def _measurements(chosen: argparse.Namespace) -> 'dict[str, list[Measurement]]':
     """Return the measurements of each recording: of a bag, or of each throw of a file."""
-    from disc_sim_ros.estimation import replay, throw_csv  # noqa: PLC0415
+    from disc_sim_ros.estimation import throw_csv  # noqa: PLC0415
+    from disc_sim_ros.estimation.prediction import replay  # noqa: PLC0415
 
     source = Path(chosen.source)
     if source.suffix.lower() == '.csv':
@@ -157,7 +158,7 @@ def _measurements(chosen: argparse.Namespace) -> 'dict[str, list[Measurement]]':
 def _of_bag(source: Path, topic: str | None) -> 'list[Measurement]':
     from disc_sim_ros.analysis import recording  # noqa: PLC0415
     from disc_sim_ros.bags.reader import open_bag  # noqa: PLC0415
-    from disc_sim_ros.estimation import replay  # noqa: PLC0415
+    from disc_sim_ros.estimation.prediction import replay  # noqa: PLC0415
 
     discs = recording.discs(open_bag(source), topic)
     if len(discs) > 1:

@@ -4,17 +4,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from disc_sim_ros.estimation.ellipse import half_axes
-from disc_sim_ros.estimation.predictor import Prediction, Predictor
-from disc_sim_ros.estimation.replay import fitted_flight
+from disc_sim_ros.estimation.prediction.ellipse import half_axes
+from disc_sim_ros.estimation.prediction.predictor import Prediction, Predictor
+from disc_sim_ros.estimation.prediction.replay import fitted_flight
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.view.predicted import SHARE, ShownPredictions
 from disc_sim_ros.view.shown import ShownFlight
 
 if TYPE_CHECKING:
     from disc_sim_ros.arrays import FloatArray
-    from disc_sim_ros.estimation.predictor import PredictorConfig
-    from disc_sim_ros.estimation.replay import FollowedThrow
+    from disc_sim_ros.estimation.prediction.predictor import PredictorConfig
+    from disc_sim_ros.estimation.prediction.replay import FollowedThrow
     from disc_sim_ros.units import System
 
 RATE = 200.0  # Hz, samples of the fitted flight

@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from disc_sim_ros.cli import fly, predict
-from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from estimation.synthetic_throws import throw

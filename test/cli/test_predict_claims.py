@@ -5,7 +5,7 @@ import json
 import pytest
 
 from disc_sim_ros.cli import predict
-from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from estimation.synthetic_throws import throw

@@ -6,8 +6,8 @@ import math
 import numpy as np
 
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.predictor import Measurement, up_axis
-from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.predictor import Measurement, up_axis
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.physics.kernels.rows import AT

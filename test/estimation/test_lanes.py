@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from disc_sim_ros.estimation import lanes, lift_coordinates, local
-from disc_sim_ros.estimation.prior import ThrowPrior
-from disc_sim_ros.estimation.throw_fit import Estimate, Model
+from disc_sim_ros.estimation import lift_coordinates, local
+from disc_sim_ros.estimation.prediction import lanes
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.throw_fit import Estimate, Model
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.rows import AT

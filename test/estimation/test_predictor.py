@@ -5,8 +5,13 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
-from disc_sim_ros.estimation.prior import ThrowPrior, disc_offsets
+from disc_sim_ros.estimation.prediction.predictor import (
+    Measurement,
+    Prediction,
+    Predictor,
+    PredictorConfig,
+)
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior, disc_offsets
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
@@ -281,7 +286,7 @@ def test_uncertain_disc_widens_the_ellipse(throws):
 
 
 def test_memory_of_a_throw_is_bounded(throws):
-    from disc_sim_ros.estimation.predictor import MOST_MEASUREMENTS
+    from disc_sim_ros.estimation.prediction.predictor import MOST_MEASUREMENTS
 
     t = throw(SETUP, PRIOR, 5, rate=1000.0, least=2.5)
     predictor, prediction = Predictor(CONFIG), None

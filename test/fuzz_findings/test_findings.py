@@ -20,8 +20,9 @@ from disc_sim_ros.bags.topic import Topic, parse_qos
 from disc_sim_ros.bags.writer import BagWriter
 from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.errors import BagError, ConfigError, DiscSimError
-from disc_sim_ros.estimation import replay, throw_csv
-from disc_sim_ros.estimation.predictor import Measurement
+from disc_sim_ros.estimation import throw_csv
+from disc_sim_ros.estimation.prediction import replay
+from disc_sim_ros.estimation.prediction.predictor import Measurement
 from disc_sim_ros.physics import disc_file
 
 START = 1_700_000_000_000_000_000  # ns

@@ -64,6 +64,11 @@ def test_the_import_rules_hold(tree):
             f'import {PACKAGE}.validation',
             'the kernels are arithmetic: no files, no messages, no units for people',
         ),
+        (
+            'estimation/prediction',
+            f'import {PACKAGE}.estimation.fitting',
+            'predicting a landing and identifying a disc share only what measures',
+        ),
         ('ros', f'import {PACKAGE}.cli', 'one direction, down to the physics'),
     ],
 )

@@ -16,7 +16,7 @@ from disc_sim_ros import (
     fly_many,
     load_disc,
 )
-from disc_sim_ros.estimation.predictor import Measurement
+from disc_sim_ros.estimation.prediction.predictor import Measurement
 
 FRISBEE = Setup(disc=load_disc('frisbee'))
 

@@ -206,18 +206,21 @@ EXCEPTIONS = {
     ('paper/crosscheck.py', '-launch.height'): 'the same',
     ('envs/steering.py', '0.0 - z'): 'from the disc to a target on the ground, a difference',
     ('estimation/lift_coordinates.py', '-y'): 'a vector at right angles, no turn',
-    ('estimation/lanes.py', '-y'): 'the same, compiled',
-    ('estimation/lanes.py', '-Z'): 'the climb of a velocity, an angle about no axis of a frame',
+    ('estimation/prediction/lanes.py', '-y'): 'the same, compiled',
     (
-        'estimation/lanes.py',
+        'estimation/prediction/lanes.py',
+        '-Z',
+    ): 'the climb of a velocity, an angle about no axis of a frame',
+    (
+        'estimation/prediction/lanes.py',
         '-math.asin(min(max((b * X - a * Y) / level, -1.0), 1.0))',
     ): 'the bank of an axis about its path, in one system',
     ('estimation/local.py', '-Y'): 'the shortest rotation of one vector to another',
     (
-        'estimation/throw_fit.py',
+        'estimation/prediction/throw_fit.py',
         '-s.VY',
     ): 'how a landing moves with its height, in one system',
-    ('estimation/prior.py', '-self.spin.mean'): 'the other hand, in one system',
+    ('estimation/prediction/prior.py', '-self.spin.mean'): 'the other hand, in one system',
     ('ros/recorder/diagnostics.py', '-r.before'): 'a count of messages, in descending order',
 }
 # physics/frames.py is the home of the turn; what numba compiles cannot import it.

@@ -8,9 +8,9 @@ import pytest
 import browser
 from disc_sim_ros.cli import predict
 from disc_sim_ros.cli.predict_page import shown_throw
-from disc_sim_ros.estimation import replay
-from disc_sim_ros.estimation.predictor import PredictorConfig
-from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction import replay
+from disc_sim_ros.estimation.prediction.predictor import PredictorConfig
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper

@@ -5,7 +5,7 @@ from typing import Any
 
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import Measurement
+from disc_sim_ros.estimation.prediction.predictor import Measurement
 from disc_sim_ros.physics.frames import earth_from_body
 from disc_sim_ros.quantities import PREDICTION
 from disc_sim_ros.ros.predictor.options import NodeConfig, is_plain

@@ -22,7 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from disc_sim_ros import topics
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import Prediction, Predictor, first_call_note
+from disc_sim_ros.estimation.prediction.predictor import Prediction, Predictor, first_call_note
 from disc_sim_ros.ros import node_main, parameters
 from disc_sim_ros.ros.internals import PolledSubscription
 from disc_sim_ros.ros.predictor import outputs

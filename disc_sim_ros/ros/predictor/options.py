@@ -7,8 +7,8 @@ from typing import Any
 
 from disc_sim_ros.arrays import Vector
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import PredictorConfig
-from disc_sim_ros.estimation.predictor_options import predictor_config
+from disc_sim_ros.estimation.prediction.predictor import PredictorConfig
+from disc_sim_ros.estimation.prediction.predictor_options import predictor_config
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup

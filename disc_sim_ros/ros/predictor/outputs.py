@@ -11,8 +11,8 @@ import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.ellipse import half_axes
-from disc_sim_ros.estimation.predictor import Prediction
+from disc_sim_ros.estimation.prediction.ellipse import half_axes
+from disc_sim_ros.estimation.prediction.predictor import Prediction
 from disc_sim_ros.physics.frames import map_from_paper, odometry_array, rotation_matrix
 from disc_sim_ros.ros import messages
 from disc_sim_ros.ros.predictor.options import Plane

@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from visualization_msgs.msg import MarkerArray
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.ros.predictor import outputs

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.throw_fit import Estimate, Linear, Model, square_root
+from disc_sim_ros.estimation.prediction.throw_fit import Estimate, Linear, Model, square_root
 
 DRAWS = 64  # throws; a multiple of 16
 _LEAST_SHARE = 0.5  # of the draws that must land

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.ellipse import covariance_about
-from disc_sim_ros.estimation.throw_estimator import ThrowEstimator
-from disc_sim_ros.estimation.throw_fit import Fitted, Linear, Measurements, Model
+from disc_sim_ros.estimation.prediction.ellipse import covariance_about
+from disc_sim_ros.estimation.prediction.throw_estimator import ThrowEstimator
+from disc_sim_ros.estimation.prediction.throw_fit import Fitted, Linear, Measurements, Model
 
 LEAST_WEIGHT = 1e-6  # a model below it is left out for the rest of the throw
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.throw_estimator import straight
+from disc_sim_ros.estimation.prediction.throw_estimator import straight
 from disc_sim_ros.physics.frames import flip
 
 WINDOW = 0.2  # s, in which a beginning is recognised ...

@@ -13,8 +13,9 @@ import math
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import lanes, lift_coordinates
-from disc_sim_ros.estimation.prior import ThrowPrior
+from disc_sim_ros.estimation import lift_coordinates
+from disc_sim_ros.estimation.prediction import lanes
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.kernels.rows import AT

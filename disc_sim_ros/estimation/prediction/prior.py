@@ -7,7 +7,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import lanes
+from disc_sim_ros.estimation.prediction import lanes
 from disc_sim_ros.physics.disc import Disc
 
 # Standard deviations of the offsets of a disc whose file states none: about as discs of one kind

@@ -9,8 +9,8 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import lift_coordinates, local
-from disc_sim_ros.estimation.ellipse import drawn_landings
-from disc_sim_ros.estimation.throw_fit import (
+from disc_sim_ros.estimation.prediction.ellipse import drawn_landings
+from disc_sim_ros.estimation.prediction.throw_fit import (
     POSITION,
     Estimate,
     Fitted,

@@ -8,7 +8,12 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import throw_csv
-from disc_sim_ros.estimation.predictor import Measurement, Prediction, Predictor, PredictorConfig
+from disc_sim_ros.estimation.prediction.predictor import (
+    Measurement,
+    Prediction,
+    Predictor,
+    PredictorConfig,
+)
 from disc_sim_ros.physics.frames import flip, paper_from_map, paper_quaternion, rotation_matrix
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import POSITION

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 import math
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.predictor import PredictorConfig
-from disc_sim_ros.estimation.prior import Gaussian, ThrowPrior, disc_offsets, disc_shape
+from disc_sim_ros.estimation.prediction.predictor import PredictorConfig
+from disc_sim_ros.estimation.prediction.prior import Gaussian, ThrowPrior, disc_offsets, disc_shape
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
 

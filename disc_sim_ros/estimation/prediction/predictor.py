@@ -8,10 +8,17 @@ import numpy as np
 from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import lanes, local, throw_detection
-from disc_sim_ros.estimation.disc_choice import DiscChoice
-from disc_sim_ros.estimation.prior import ThrowPrior
-from disc_sim_ros.estimation.throw_fit import Estimate, Fitted, Linear, Measurements, Model
+from disc_sim_ros.estimation import local
+from disc_sim_ros.estimation.prediction import lanes, throw_detection
+from disc_sim_ros.estimation.prediction.disc_choice import DiscChoice
+from disc_sim_ros.estimation.prediction.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.throw_fit import (
+    Estimate,
+    Fitted,
+    Linear,
+    Measurements,
+    Model,
+)
 from disc_sim_ros.physics.flight import SLOWING, Setup
 from disc_sim_ros.physics.frames import map_from_paper, paper_from_map
 from disc_sim_ros.physics.kernels.jit import note_before

@@ -1,0 +1,1 @@
+"""Where a disc lands, from measurements while it flies."""
