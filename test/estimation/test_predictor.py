@@ -240,6 +240,22 @@ def test_catch_ends_a_throw(throws):
     assert not predictor.is_following
 
 
+@pytest.mark.parametrize('later', [20.0, 1.79e9])
+def test_a_clock_that_is_set_forward_ends_a_throw(throws, later):
+    """Each second of the gap was flown: `predictor_node` computed for ever, past Ctrl-C."""
+    predictor = Predictor(CONFIG)
+    measurements = throws[0].measurements()[:60]
+    for m in measurements:
+        predictor.add(m)
+    assert predictor.update(ellipse=False) is not None
+    assert predictor.add(replace(measurements[0], time=later))
+    assert not predictor.is_following  # before the update, which flies to the newest measurement
+    assert predictor.update(ellipse=False) is None
+    for m in measurements[1:]:
+        predictor.add(replace(m, time=later + m.time))
+    assert predictor.update(ellipse=False).throw == 2
+
+
 def test_order_of_measurements_does_not_matter(throws):
     measurements = throws[2].measurements()[:60]
     shuffled = [*measurements[:10], *measurements[20:60], *measurements[10:20]]

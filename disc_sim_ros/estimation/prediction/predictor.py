@@ -48,7 +48,7 @@ class PredictorConfig:
             disc as a left-handed backhand does. 0: it is not tried.
         position_sigma: Standard deviation of each coordinate of a position [m].
         attitude_sigma: Standard deviation of the disc's axis in each direction [rad].
-        duration: Longest flight [s].
+        duration: Longest flight [s]; a later measurement is of another throw.
         ground_height: z of the ground in `map` [m].
     """
 
@@ -212,6 +212,8 @@ class Predictor:
         """Take a measurement, in any order; return False if it came too late or twice."""
         if m.time < self.newest - _BACK:
             self.reset()  # the clock was set back
+        if self._estimator is not None and m.time - self._rows[0, 0] > self._config.duration:
+            self.reset()  # it has landed long ago, or the clock was set forward
         times = self._rows[:, 0]
         place = int(np.searchsorted(times, m.time, side='right'))
         twice = place and m.time - times[place - 1] < _ORDER
