@@ -27,9 +27,11 @@ _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, 
 _HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone
 _MOST_TRIES = 8  # of a step with more and more damping
 KEPT = 3  # starts that are fitted, of those that are tried
-MORE_KEPT = 12  # for a throw that fits worse than others
+_MORE_KEPT = 12  # for a throw that fits worse than others
 ALIKE = 2.0  # ratio of the mean losses of two throws above which one is in a wrong minimum
 _FIRST_STEPS = 8
+_RELEASE_STEPS = 8  # of the fit of a release
+_GOING_ON, _MORE_STEPS = 6, 15  # fits of a thorough search that go on, and by how many steps
 # Attitudes about the path to start from: angle of attack and roll [degrees].
 _ATTACKS, _ROLLS = (-5.0, 5.0, 15.0), (-40.0, -20.0, 0.0, 20.0, 40.0)
 _SPIN_ANGLES = 12
@@ -69,7 +71,7 @@ class Solution:
 
 
 def fit_release(
-    problem: Problem, k: int, here: FloatArray, most_steps: int = 8
+    problem: Problem, k: int, here: FloatArray, most_steps: int = _RELEASE_STEPS
 ) -> tuple[FloatArray, float]:
     """Fit the release of throw `k` for given shared parameters.
 
@@ -210,7 +212,7 @@ def fitted_alone(problem: Problem, k: int) -> Alone:
 
 
 def retry_releases(
-    problem: Problem, x: FloatArray, which: Sequence[int], least_kept: int = KEPT
+    problem: Problem, x: FloatArray, which: Sequence[int], *, thorough: bool = False
 ) -> tuple[Problem, FloatArray, bool]:
     """Fit releases again from many starts, with the shared parameters known better by now.
 
@@ -221,7 +223,8 @@ def retry_releases(
         problem: The problem.
         x: Its parameters, shape (p,).
         which: Numbers of the throws.
-        least_kept: Number of starts that are fitted; more of a throw that fits badly.
+        thorough: Whether to fit from one start of each attitude in place of the few starts that
+            fit best as they are, which are often in one minimum, and to go on with the best.
 
     Returns:
         The problem with changes counted from the best first states, the parameters there, and
@@ -238,17 +241,20 @@ def retry_releases(
             return throw, here, False
         cost = cost_of_throw(problem, k, here)
         states, _, _ = problem.states_and_rows(k, here[np.newaxis])
-        best = (throw, here, False)
-        candidates = starts(throw) + _neighbours(states[0])
-        kept = MORE_KEPT if losses[k] > ALIKE * min(losses) else least_kept
-        for state in promising(problem, k, here, candidates, kept):
-            around = throw.starting_at(state)
-            alone = replace(problem, throws=(around,))
-            first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
-            fitted, fitted_cost = fit_release(alone, 0, first)
-            if fitted_cost < cost - BETTER:
-                best, cost = (around, fitted, True), fitted_cost
-        return best
+        kept = _MORE_KEPT if losses[k] > ALIKE * min(losses) else KEPT
+        near = starts(throw) + _neighbours(states[0])
+        candidates = (
+            _of_each_attitude(problem, k, here)
+            if thorough
+            else promising(problem, k, here, near, kept)
+        )
+        fits = [_fitted_from(problem, k, here, state) for state in candidates]
+        if thorough:
+            fits = [fit.going_on() for fit in sorted(fits, key=lambda f: f.cost)[:_GOING_ON]]
+        least = min(fits, key=lambda f: f.cost)
+        if least.cost >= cost - BETTER:
+            return throw, here, False
+        return least.problem.throws[0], least.here, True
 
     results = each(problem, retried)
     problem = replace(problem, throws=tuple(throw for throw, _, _ in results))
@@ -256,6 +262,32 @@ def retry_releases(
     for k, (_, here, _) in enumerate(results):
         x[problem.own(k)] = here[problem.shared :]
     return problem, x, any(better for _, _, better in results)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A fitted release of one throw.
+
+    Attributes:
+        problem: Of this throw alone, with changes counted from where the fit began.
+        here: The shared parameters and the release, shape (shared + 12,).
+        cost: Of the throw.
+    """
+
+    problem: Problem
+    here: FloatArray
+    cost: float
+
+    def going_on(self) -> '_Fit':
+        """Return the fit after more steps."""
+        return _Fit(self.problem, *fit_release(self.problem, 0, self.here, _MORE_STEPS))
+
+
+def _fitted_from(problem: Problem, k: int, here: FloatArray, state: FloatArray) -> _Fit:
+    """Return the release of throw `k` fitted from a first state."""
+    alone = replace(problem, throws=(problem.throws[k].starting_at(state),))
+    first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
+    return _Fit(alone, *fit_release(alone, 0, first))
 
 
 def promising(
@@ -272,6 +304,13 @@ def promising(
         row[problem.shared :] = [*delta, turn]
     losses = robust_loss(problem.whitened(k, tried)).sum(axis=1)
     return [candidates[i] for i in np.argsort(losses, kind='stable')[:kept]]
+
+
+def _of_each_attitude(problem: Problem, k: int, here: FloatArray) -> list[FloatArray]:
+    """Return for each attitude of `starts` the first state that fits best as it is."""
+    every = starts(problem.throws[k])
+    best_last = reversed(promising(problem, k, here, every, len(every)))
+    return list({tuple(state[6:10]): state for state in best_last}.values())
 
 
 def _neighbours(state: FloatArray) -> list[FloatArray]:

@@ -17,8 +17,6 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.coefficients import NAMES
 from disc_sim_ros.estimation.fitting import (
     BETTER,
-    KEPT,
-    MORE_KEPT,
     Progress,
     promising,
     retry_releases,
@@ -31,12 +29,12 @@ from disc_sim_ros.estimation.normal_equations import (
     linear_blocks,
     reduced,
 )
-from disc_sim_ros.estimation.problem import FINE, Problem
+from disc_sim_ros.estimation.problem import FINE, ROUGH, Problem
 from disc_sim_ros.estimation.throws import RELEASE_SIZE
 from disc_sim_ros.quantities import COEFFICIENTS
 
 _FACTORS = (100.0, 30.0, 10.0, 5.0, 3.0, 2.0)  # on the noise, before the noise itself
-_TRUSTED = 3.0  # factor down to which beliefs may be drawn
+_TRUSTED = 3.0  # factor down to which beliefs may be drawn, and steps rough
 # How far drawn beliefs lie from those of the problem, in its standard deviations, and how many of
 # the parameters of a release keep theirs, because the gyro measures them.
 _COEFFICIENT_SPREAD, _RELEASE_SPREAD, _TURNING = 1.0, 0.5, 4
@@ -76,8 +74,12 @@ def search(
 ) -> End:
     """Return what a graduated search finds from shared parameters and the best of many releases.
 
+    The throws may still be in wrong minima of their releases: see `settled`.
+
     Args:
-        problem: The problem.
+        problem: The problem; while the noise is large, it is solved in rough steps, and then in
+            FINE ones: rough steps can misread a gyro by more than its noise, and then favour a
+            wrong minimum.
         shared: First shared parameters, shape (shared,).
         progress: Called with the stage, a count and the cost.
         stage: For `progress`.
@@ -86,32 +88,39 @@ def search(
     """
     first = problem.means.copy()
     first[: problem.shared] = np.clip(shared, *problem.bounds)
-    early = replace(problem, throws=tuple(throw.until(_BEGINNING) for throw in problem.throws))
+    beginnings = tuple(throw.until(_BEGINNING) for throw in problem.throws)
+    early = replace(problem, throws=beginnings, margin=ROUGH)
     throws = []
     for k, throw in enumerate(problem.throws):
         (state,) = promising(early, k, problem.here(k, first), starts(throw), 1)
         throws.append(throw.starting_at(state))
-    around = replace(problem, throws=tuple(throws))
+    around = replace(problem, throws=tuple(throws), margin=FINE)
     first[problem.shared :] = 0.0
-    others = around if drawn is None else _with_other_beliefs(around, drawn)
+    rough = replace(around, margin=ROUGH)
+    if drawn is not None:
+        rough = _with_other_beliefs(rough, drawn)
     x, cost = first, np.inf
     for count, factor in enumerate((*_FACTORS, 1.0)):
         last = factor == 1.0
         x, cost = _joint(
-            _with_noise(others if factor > _TRUSTED else around, factor),
+            _with_noise(rough if factor > _TRUSTED else around, factor),
             x,
             _LAST_STEPS if last else _STEPS,
             _ENOUGH_AT_LAST if last else _ENOUGH,
         )
         if progress is not None:
             progress(stage, count + 1, cost)
-    result = End(around, x, cost)
+    return End(around, x, cost)
+
+
+def settled(end: End) -> End:
+    """Return an end of which no throw fits better with a release from another attitude."""
     for _ in range(_RETRIES):
-        again = _with_other_releases(result, range(len(problem.throws)))
-        if again is None or again.cost > result.cost - BETTER:
+        again = _with_other_releases(end, range(len(end.problem.throws)))
+        if again is None or again.cost > end.cost - BETTER:
             break
-        result = again
-    return result
+        end = again
+    return end
 
 
 def search_without(
@@ -140,19 +149,13 @@ def search_without(
     x = np.insert(
         result.x, np.full(RELEASE_SIZE, problem.own(k).start), problem.throws[k].believed
     )
-    whole = End(replace(problem, throws=tuple(throws)), x, np.inf)
-    return _with_other_releases(whole, (k,), MORE_KEPT) or whole
+    whole = End(replace(problem, throws=tuple(throws), margin=FINE), x, np.inf)
+    return _with_other_releases(whole, (k,)) or whole
 
 
-def refined(end: End) -> End:
-    """Return an end fitted in finer steps: rough ones leave a pattern in the residuals."""
-    problem = replace(end.problem, margin=FINE)
-    return End(problem, *_joint(problem, end.x, _STEPS, _ENOUGH_AT_LAST))
-
-
-def _with_other_releases(result: End, which: Sequence[int], kept: int = KEPT) -> End | None:
-    """Return what is found with releases from many starts; None if none of them is better."""
-    around, x, better = retry_releases(result.problem, result.x, which, kept)
+def _with_other_releases(end: End, which: Sequence[int]) -> End | None:
+    """Return what is found with releases from all attitudes; None if none of them is better."""
+    around, x, better = retry_releases(end.problem, end.x, which, thorough=True)
     if not better:
         return None
     return End(around, *_joint(around, x, _LAST_STEPS, _ENOUGH_AT_LAST))

@@ -21,7 +21,7 @@ from disc_sim_ros.estimation.fitting import (
 from disc_sim_ros.estimation.information import Unidentifiable
 from disc_sim_ros.estimation.noise import HOPELESS, estimated_noise, refuse_misfit
 from disc_sim_ros.estimation.observations import NOISE
-from disc_sim_ros.estimation.problem import FINEST, ROUGH, Prior, Problem
+from disc_sim_ros.estimation.problem import FINE, FINEST, ROUGH, Prior, Problem
 from disc_sim_ros.estimation.throws import Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import paper_from_map
@@ -189,10 +189,10 @@ def identify(
         search = starting.Search(starts, seed, progress)
         problem, x = starting.started(problem, search)
         best = Best(x)
-        rough = replace(problem, margin=ROUGH)
-        x = starting.from_starts(rough, x, search, best).x
+        x = starting.from_starts(problem, x, search, best).x
         given = set(noise or {})
-        refuse_misfit(problem, estimated_noise(rough, x, given), given, HOPELESS)
+        refuse_misfit(problem, estimated_noise(problem, x, given), given, HOPELESS)
+        problem = replace(problem, margin=FINE)
         problem, x, left_out = _identifiable(problem, x, refuse=free is not None, anyway=anyway)
         best = Best(x)
         solution = solve(problem, x, best=best, progress=progress, stage='fit')

@@ -61,7 +61,10 @@ def _stage(number: int, starts: int) -> str:
 
 
 def started(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
-    """Return the problem around the best start of each throw, and first parameters."""
+    """Return the problem around the best start of each throw, and first parameters.
+
+    Its steps are as fine as those of the search.
+    """
     return (_graduated if problem.turns_only else fitted_apart)(problem, search)
 
 
@@ -84,6 +87,7 @@ def fitted_apart(problem: Problem, search: Search) -> tuple[Problem, FloatArray]
     x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)
     least = min(alone.loss for alone in fitted)
     good = [alone for alone in fitted if alone.loss < ALIKE * least]
+    problem = replace(problem, margin=ROUGH)
     return (problem, x) if len(good) == len(fitted) else _agreeing(problem, x, good)
 
 
@@ -95,17 +99,16 @@ def _agreeing(
     Some throws alone end in a wrong local minimum: attitudes that nothing measured have many. With
     the coefficients of a throw that fits, the releases of the others are found.
     """
-    rough = replace(problem, margin=ROUGH)
     n = problem.shared
     ends: list[tuple[Solution, Problem]] = []
     for shared in (x[:n], *(alone.shared for alone in good)):
         tried = problem.means.copy()
         tried[:n] = shared
-        around, tried, _ = retry_releases(rough, tried, range(len(problem.throws)))
+        around, tried, _ = retry_releases(problem, tried, range(len(problem.throws)))
         solution = solve(around, tried, most_steps=_STEPS)
         ends.append((solution, around))
     best, around = min(ends, key=lambda end: end[0].cost)
-    return replace(problem, throws=around.throws), best.x
+    return around, best.x
 
 
 def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
@@ -113,27 +116,26 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
 
     In a wrong minimum neighbouring residuals are usually correlated. Then more searches follow.
     """
-    rough = replace(problem, margin=ROUGH)
     n = len(problem.free)
     ends: list[graduated.End] = []
     for free in search.coefficients(problem, problem.means[:n]):
         shared = problem.means[: problem.shared].copy()
         shared[:n] = free
-        ends.append(graduated.search(rough, shared, search.progress, _RELEASES))
+        ends.append(graduated.search(problem, shared, search.progress, _RELEASES))
     throws = len(problem.throws)
-    for k in range(throws if throws > 1 else 0):
-        shared = problem.means[: problem.shared]
-        ends.append(graduated.search_without(rough, shared, k, search.progress, _RELEASES))
-    end = min(ends, key=lambda e: e.cost)
+    shared = problem.means[: problem.shared]
+    ends += (
+        graduated.search_without(problem, shared, k, search.progress, _RELEASES)
+        for k in range(throws if throws > 1 else 0)
+    )
+    end = graduated.settled(min(ends, key=lambda e: e.cost))
     generator = np.random.default_rng(search.seed)
     for _ in range(DRAWN):
-        fine = graduated.refined(end)
-        if information.correlation(fine.problem, fine.x).is_chance:
+        if information.correlation(end.problem, end.x).is_chance:
             break
-        shared = problem.means[: problem.shared]
-        other = graduated.search(rough, shared, search.progress, _RELEASES, generator)
-        end = min(end, other, key=lambda e: e.cost)
-    return replace(problem, throws=end.problem.throws), end.x
+        other = graduated.search(problem, shared, search.progress, _RELEASES, generator)
+        end = min(end, graduated.settled(other), key=lambda e: e.cost)
+    return end.problem, end.x
 
 
 def from_starts(problem: Problem, x: FloatArray, search: Search, best: Best) -> Solution:
