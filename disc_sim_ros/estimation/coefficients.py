@@ -16,7 +16,7 @@ from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics.disc import AeroTable, Disc, LinearAero
-from disc_sim_ros.physics.flight import Setup
+from disc_sim_ros.physics.flight import Setup, check_setup
 from disc_sim_ros.physics.kernels.aerodynamics import linear_coefficients, table_coefficients
 from disc_sim_ros.physics.kernels.rows import AT
 from disc_sim_ros.quantities import COEFFICIENTS
@@ -64,6 +64,7 @@ def base_of(setup: Setup) -> Base:
         ConfigError: The lift or the moment of the disc does not change from 0 to 10 degrees, or
             the disc has no damping, so that a factor on it means nothing.
     """
+    check_setup(setup)
     disc, aero = setup.disc, setup.aero or setup.disc.aero
     plant = setup.plant
 
@@ -167,6 +168,8 @@ def chosen(names: Sequence[str]) -> list[int]:
     Raises:
         ConfigError: A name is unknown or stands twice.
     """
+    if isinstance(names, str):
+        raise ConfigError('free', names, f"give a list of names, such as ['{NAMES[0]}']")
     for name in names:
         validation.choice('free', name, NAMES)
         if list(names).count(name) > 1:

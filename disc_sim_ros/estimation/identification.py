@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import coefficients, errors, information, marginal, profile, starting
@@ -27,7 +28,7 @@ from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.sampled import fly_sampled
 from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
-from disc_sim_ros.quantities import COEFFICIENT_SPREAD
+from disc_sim_ros.quantities import COEFFICIENT_SPREAD, IDENTIFICATION
 
 _SAME_NOISE = 0.1  # relative change of an estimated noise below which it is not refined
 _STEPS_WITHOUT = 12  # of a fit without one of the throws
@@ -164,12 +165,15 @@ def identify(
         progress: Called with a stage, a count and the cost.
 
     Raises:
-        ConfigError: A name is unknown, the throws do not determine a coefficient of `free`, or no
-            disc like the base disc flies so. Where they determine none at all, releases and wind
-            are fitted with the coefficients of the base disc.
+        ConfigError: A name is unknown, a noise is out of range, the throws do not determine a
+            coefficient of `free`, or no disc like the base disc flies so. Where they determine
+            none at all, releases and wind are fitted with the coefficients of the base disc.
     """
     if not throws:
         raise ConfigError('throws', 0, 'give at least one throw')
+    for kind, deviation in (noise or {}).items():
+        validation.choice('noise', kind, NOISE)
+        IDENTIFICATION['noise'].check(deviation, f'noise of {kind}')
     base = base_of(setup)
     spread = np.array([COEFFICIENT_SPREAD[name] for name in NAMES])
     chosen = range(len(NAMES)) if free is None else coefficients.chosen(free)

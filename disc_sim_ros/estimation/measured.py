@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import local
@@ -25,6 +26,7 @@ from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.thrower import Release
 from disc_sim_ros.quantities import LAUNCH
 
+_COMPONENTS = {'position': 3, 'camera': 2, 'attitude': 4, 'gyro': 3, 'acceleration': 3}
 _FEWEST = 8  # samples of an instrument
 _FASTEST = 60.0  # m/s; the longest throws are released at 40
 _SLOWEST, _SHORTEST_PATH = 3.0, 2.0  # m/s, m: below, nothing was thrown
@@ -82,11 +84,13 @@ def throw_from(
         release: The measured release with its errors, if there is one.
 
     Raises:
-        ConfigError: There are too few samples, times do not increase, units look wrong, or what
-            was measured is no throw of a disc.
+        ConfigError: Shapes do not fit, there are too few samples, times do not increase, units
+            look wrong, or what was measured is no throw of a disc.
     """
     if not columns:
         raise ConfigError('throws', name, 'no row has a measurement')
+    for kind, (t, values) in columns.items():
+        _check_columns(name, kind, np.asarray(t), np.asarray(values))
     start = min(float(t[0]) for t, _ in columns.values())
     observations: list[Observation] = []
     for kind, (t, values) in columns.items():
@@ -122,6 +126,16 @@ def _observation(
         case 'gyro':
             return Gyro(t, values)
     return Accelerations(t, values, instruments.gravity, instruments.largest_acceleration)
+
+
+def _check_columns(name: str, kind: str, t: FloatArray, values: FloatArray) -> None:
+    validation.choice(f'{name}: instrument', kind, _COMPONENTS)
+    width = _COMPONENTS[kind]
+    if t.ndim != 1 or values.shape != (len(t), width):
+        allowed = f'give times of shape (n,) and values of shape (n, {width})'
+        raise ConfigError(f'{name}: {kind}', f'shapes {t.shape} and {values.shape}', allowed)
+    if not (np.isfinite(t).all() and np.isfinite(values).all()):
+        raise ConfigError(f'{name}: {kind}', 'nan or inf', 'give finite numbers')
 
 
 def _check_times(name: str, kind: str, t: FloatArray) -> None:
