@@ -125,7 +125,7 @@ def parser(prog: str = 'identify') -> Parser:
         name = f'release_{field}_error'
         text = f'standard error of the {field} in --techdisc'
         add_quantity(made, f'--{name.replace("_", "-")}', IDENTIFICATION[name], text=text)
-    text = 'mean wind beforehand, in map axes'
+    text = 'expected velocity of the air in map axes'
     add_components(made, '--wind', list(MEAN_WIND.values())[:2], ('X', 'Y'), text)
     add_quantity(made, '--wind-error', IDENTIFICATION['wind_error'])
     flags.add_density(made)
@@ -147,7 +147,9 @@ def parser(prog: str = 'identify') -> Parser:
         help='new folder for report.html with plots, throws.html with the fitted flights in 3D '
         '(needs trimesh), and the numbers as report.json',
     )
-    search.add_argument('--json', action='store_true', help='print one JSON document')
+    search.add_argument(
+        '--json', action='store_true', help='print one JSON document instead of the summary'
+    )
     output.add_units(search)
     return p
 

@@ -42,8 +42,8 @@ def add_units(group: argparse._ActionsContainer) -> None:
         '--units',
         choices=tuple(SYSTEMS),
         default='metric',
-        help='of what is printed and of the page: m, m/s, rad/s or ft, mph, rpm; data files and '
-        'JSON keep SI units',
+        help='of what is printed, of plots and pages: m, m/s, rad/s or ft, mph, rpm; data files '
+        'and JSON keep SI units',
     )
 
 

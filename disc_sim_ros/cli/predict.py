@@ -56,11 +56,19 @@ def parser(prog: str = 'predict') -> Parser:
     )
     for name, quantity in PREDICTION.items():
         add_quantity(p, _FLAGS[name], quantity)
-    add_components(p, '--wind', tuple(MEAN_WIND.values()), ('X', 'Y', 'Z'), 'expected wind in map')
+    add_components(
+        p,
+        '--wind',
+        tuple(MEAN_WIND.values()),
+        ('X', 'Y', 'Z'),
+        'expected velocity of the air in map axes',
+    )
     p.add_argument(
         '--position-only', action='store_true', help='leave out attitudes that were measured'
     )
-    p.add_argument('--json', action='store_true', help='print one JSON document')
+    p.add_argument(
+        '--json', action='store_true', help='print one JSON document instead of the summary'
+    )
     output.add_plot(p)
     pages.add_page(p)
     output.add_units(p)
