@@ -6,6 +6,7 @@ import dataclasses
 import json
 from pathlib import Path
 import sys
+import time
 from typing import TYPE_CHECKING, Any
 
 from disc_sim_ros import __version__
@@ -13,6 +14,7 @@ from disc_sim_ros.cli import measured_file, output, pages
 from disc_sim_ros.cli.arguments import Parser, add_components, add_quantity, path
 from disc_sim_ros.cli.flags import Discs
 from disc_sim_ros.cli.main import run_program
+from disc_sim_ros.cli.progress import duration
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.quantities import MEAN_WIND, PREDICTION
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from disc_sim_ros.estimation.prediction.predictor import Measurement, PredictorConfig
     from disc_sim_ros.estimation.prediction.replay import FollowedThrow
 
+_EVERY = 10.0  # s between two lines of progress
 _STALE = 0.1  # s; a prediction that is older than its row is told
 WATCHED = (0.3, 0.5, 1.0, 1.5, 2.0)  # s, rows of the summary
 LEAST_MISS = 0.01  # m, lower end of the axis of the plot
@@ -90,15 +93,15 @@ def _run(chosen: argparse.Namespace) -> int:
     note = first_call_note()
     if note:
         output.note(chosen.prog, note)
-    throws = replay(recordings, config)
+    count = sum(len(measurements) for measurements in recordings.values())
+    throws = replay(recordings, config, _Progress(chosen.prog, count))
     if not throws:
-        count = sum(len(measurements) for measurements in recordings.values())
         ask = 'are positions in m with z up, and times in s, in their order?'
         raise DiscSimError(f'{chosen.source}: no throw in {count} measurements; {ask}')
     for name in recordings if len(recordings) > 1 else ():
         if not any(throw.name.removesuffix(', 1') == name for throw in throws):
-            count = len(recordings[name])
-            output.note(chosen.prog, f'{name}: not recognised as a throw, {count} measurements')
+            lost = len(recordings[name])
+            output.note(chosen.prog, f'{name}: not recognised as a throw, {lost} measurements')
     if chosen.json:
         document = {'throws': [_document(throw, config.discs) for throw in throws]}
         output.show(json.dumps(document, allow_nan=False))
@@ -263,6 +266,22 @@ def _summary(throw: 'FollowedThrow', discs: Sequence[str], system: System) -> st
         )
         lines.append('  disc: ' + ', '.join(f'{name} {100 * w:.1f} %' for name, w in likely))
     return '\n'.join(lines)
+
+
+class _Progress:
+    """Shows on stderr how many measurements are done, at most every 10 seconds."""
+
+    def __init__(self, prog: str, total: int) -> None:
+        self._prog, self._total = prog, total
+        self._started = self._last = time.monotonic()
+
+    def __call__(self, done: int) -> None:
+        """Show the number of measurements so far, and a guess of the time left."""
+        now = time.monotonic()
+        if now - self._last >= _EVERY:
+            self._last = now
+            left = duration((now - self._started) / done * (self._total - done))
+            output.note(self._prog, f'{done} of {self._total} measurements; about {left} left')
 
 
 def _figure(throws: 'Sequence[FollowedThrow]', system: System) -> 'Figure':

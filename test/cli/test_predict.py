@@ -68,6 +68,17 @@ def test_a_throw_of_a_csv_that_is_not_recognised_is_named(csv, tmp_path, capsys)
     assert 'throw 1: not recognised as a throw, 30 measurements' in err
 
 
+def test_a_long_recording_shows_how_far_it_is(csv, capsys, monkeypatch):
+    """A file of 200,000 rows takes hours, which passed without a word."""
+    file, _ = csv
+    monkeypatch.setattr(predict, '_EVERY', 0.0)
+    assert predict.main([str(file), '--disc-uncertainty', '0']) == 0
+    lines = [x for x in capsys.readouterr().err.splitlines() if ' measurements; about ' in x]
+    total = len(file.read_text().splitlines()) - 1
+    assert lines[0].startswith(f'predict: 1 of {total} measurements; about ')
+    assert lines[-1] == f'predict: {total} of {total} measurements; about 0 s left'
+
+
 def test_the_samples_of_fly_are_measurements(tmp_path, capsys):
     file = tmp_path / 'flown.csv'
     assert fly.main(['--csv', str(file), '--samples', '30']) == 0

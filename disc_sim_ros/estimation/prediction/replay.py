@@ -1,7 +1,8 @@
 """Recorded measurements through the predictor, as if they came in now."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+import itertools
 
 import numpy as np
 
@@ -70,17 +71,21 @@ class FollowedThrow:
 
 
 def replay(
-    recordings: Mapping[str, Iterable[Measurement]], config: PredictorConfig
+    recordings: Mapping[str, Iterable[Measurement]],
+    config: PredictorConfig,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> list[FollowedThrow]:
     """Return the predictions of every throw in recordings, each with a clock of its own.
 
     Args:
         recordings: Measurements in their order, by the name of the recording.
         config: What is known beforehand.
+        progress: Called after each measurement with the number of those so far.
     """
     throws: list[FollowedThrow] = []
+    counted = itertools.count(1)
     for recording, series in recordings.items():
-        replayed = _replayed(series, config)
+        replayed = _replayed(series, config, lambda: progress(next(counted)))
         for k, (predictions, measured) in enumerate(replayed, 1):
             number = len(throws) + 1
             name = f'throw {number}'
@@ -91,7 +96,7 @@ def replay(
 
 
 def _replayed(
-    measurements: Iterable[Measurement], config: PredictorConfig
+    measurements: Iterable[Measurement], config: PredictorConfig, taken: Callable[[], object]
 ) -> list[tuple[tuple[Prediction, ...], tuple[Measurement, ...]]]:
     """Return predictions and measurements of each throw in one series of measurements."""
     predictor = Predictor(config)
@@ -107,6 +112,7 @@ def _replayed(
                 last, covariance = m.time, prediction.covariance
             prediction = replace(prediction, covariance=covariance)
             throws.setdefault(prediction.throw, []).append(prediction)
+        taken()
     return [
         (tuple(of), tuple(m for m in every if of[0].reference_time <= m.time <= of[-1].time))
         for of in throws.values()
