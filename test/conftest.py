@@ -17,9 +17,8 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 IN_REAL_TIME, IN_BACKGROUND = 0, 10  # niceness
 FIRST = {  # the files of the first group
-    'cli/test_demo', 'live/test_live_view', 'sim/test_node_control', 'sim/test_node_input',
-    'sim/test_node_process', 'recorder/test_node', 'ros/test_parameters',
-    'ros/test_parameters_of_a_node',
+    'sim/test_node_control', 'sim/test_node_input', 'sim/test_node_process', 'recorder/test_node',
+    'ros/test_parameters', 'ros/test_parameters_of_a_node',
 }  # fmt: skip
 
 

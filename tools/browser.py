@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 import json
 import os
 from pathlib import Path
+import select
 import shutil
 import signal
 import subprocess
@@ -84,7 +85,6 @@ class Browser:
         )  # fmt: skip
         os.close(to_read)
         os.close(to_write)
-        os.set_blocking(self._from, False)
         self._session = ''
         try:
             self._attach()
@@ -171,11 +171,10 @@ class Browser:
     def _read(self, deadline: float) -> list[dict[str, Any]]:
         """Return the answers that have arrived; wait for bytes until the deadline."""
         while time.monotonic() < deadline:
-            try:
-                data = os.read(self._from, 1 << 20)
-            except BlockingIOError:
-                time.sleep(0.002)
-                continue
+            left = max(deadline - time.monotonic(), 0.0)
+            if not select.select([self._from], [], [], left)[0]:
+                break
+            data = os.read(self._from, 1 << 20)
             if not data:
                 raise BrowserError('the browser has ended')
             *whole, self._rest = (self._rest + data).split(b'\0')

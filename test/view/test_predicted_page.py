@@ -22,6 +22,7 @@ from view.test_browser import SIZES, TWO_FRAMES, picture, shown_at
 from view.test_page import data_of
 
 pytest.importorskip('trimesh')
+pytestmark = pytest.mark.xdist_group('browser')  # followed once
 METRIC, US = SYSTEMS['metric'], SYSTEMS['us']
 CONFIG = PredictorConfig(setup=Setup(disc=load_disc('ultrastar')))
 in_browser = pytest.mark.skipif(browser.program() is None, reason=browser.MISSING)
@@ -146,7 +147,6 @@ def test_the_numbers_come_even_if_the_disk_is_full(csv, capsys):
 
 
 @in_browser
-@pytest.mark.xdist_group('browser')
 def test_landing_and_ellipse_are_those_known_at_the_time(opened, followed):
     assert not at(opened, 0.05)['visible']  # six measurements are needed
     for time in (1.0, 2.5):
@@ -162,7 +162,6 @@ def test_landing_and_ellipse_are_those_known_at_the_time(opened, followed):
 
 
 @in_browser
-@pytest.mark.xdist_group('browser')
 def test_the_picture_shows_the_ellipse_shrink(opened):
     """Pixels of the orange of the prediction, which nothing else in the picture has."""
 
@@ -176,7 +175,6 @@ def test_the_picture_shows_the_ellipse_shrink(opened):
 
 
 @in_browser
-@pytest.mark.xdist_group('browser')
 def test_the_curve_of_the_miss_follows_the_clock(opened, followed):
     at(opened, 2.0)
     text = opened.value('document.querySelector("figure.first output").textContent')
@@ -192,7 +190,6 @@ def test_the_curve_of_the_miss_follows_the_clock(opened, followed):
 
 
 @in_browser
-@pytest.mark.xdist_group('browser')
 def test_zz_the_console_is_empty_and_no_host_was_asked(opened):
     """Last in this file: the other tests have used the page."""
     assert opened.problems == []

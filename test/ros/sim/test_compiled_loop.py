@@ -101,7 +101,7 @@ class World:
         end = time.monotonic() + DEADLINE
         while not condition():
             assert time.monotonic() < end, what
-            self.executor.spin_once(0.002)
+            self.executor.spin_once(0.01)
 
     def matched(self, *publishers):
         self.until(lambda: all(p.get_subscription_count() for p in publishers), 'matched')
@@ -228,7 +228,7 @@ def test_both_loops_publish_the_same_bytes_also_when_commands_arrive(world):
         sim.loop.submit(sim.loop.resume)
     schedule = dict.fromkeys(sims, tuple(SCHEDULE))
     while any(sim.loop.clock.now <= thrown + FLOWN for sim in sims.values()):
-        world.executor.spin_once(0.001)
+        world.executor.spin_once(0.01)  # far less than AHEAD
         for space, sim in sims.items():
             while schedule[space] and sim.loop.clock.now >= sent_at(schedule[space], thrown):
                 at, name, message = schedule[space][0]
