@@ -51,13 +51,23 @@ class Discs(argparse.Action):
         chosen.disc = chosen.discs[0]
 
 
+class OneDisc(argparse.Action):
+    """Takes one `--disc`, and refuses another, which other programs compare with it."""
+
+    def __call__(self, _: object, chosen: argparse.Namespace, value: Any, *__: object) -> None:
+        """Take the value."""
+        if hasattr(chosen, 'discs'):
+            raise argparse.ArgumentError(self, f'{value!r} is not allowed; give one disc')
+        chosen.discs, chosen.disc = (value,), value
+
+
 def add_disc(p: Parser, *, several: bool = False) -> None:
     """Add the flags of the disc and of the model; `--disc` may be given several times."""
     what = p.add_argument_group('disc and model')
     what.add_argument(
         '--disc',
         type=path,
-        action=Discs if several else 'store',
+        action=Discs if several else OneDisc,
         default=disc_file.DEFAULT_DISC,
         metavar='NAME|FILE.yaml|NUMBERS',
         help=f'{", ".join(disc_file.disc_names())}, your own file, or flight numbers: 11/5/-1/3'
@@ -112,6 +122,24 @@ def add_launch(p: Parser) -> None:
         text='spin as r c / (2 speed), where c is the diameter of the disc',
         default=argparse.SUPPRESS,
     )
+
+
+def refuse_launch(chosen: argparse.Namespace, by: str) -> None:
+    """Refuse flags of the release, except its height, beside a flag that gives releases.
+
+    Raises:
+        ConfigError: There is one; `by` is the flag that gives them.
+    """
+    given = {
+        LAUNCH_FLAGS[n]: getattr(chosen, n)
+        for n, q in LAUNCH.items()
+        if n != 'height' and getattr(chosen, n) != q.default
+    }
+    for name in ('throw', *THROWER, ADVANCE_RATIO.name):
+        if hasattr(chosen, name):
+            given[f'--{name.replace("_", "-")}'] = getattr(chosen, name)
+    for flag, value in given.items():
+        raise ConfigError(flag, value, f'{by} gives the releases')
 
 
 def add_thrower(p: Parser) -> None:

@@ -178,7 +178,10 @@ def _compare(chosen: argparse.Namespace) -> dict[str, flight.Flight]:
     plot = getattr(chosen, 'plot', None)
     default = pages.RATE if pages.is_wanted(chosen) else DEFAULT_RATE if plot is not None else 0.0
     rate = getattr(chosen, 'samples', default)
-    throws = techdisc.throws(chosen.techdisc) if hasattr(chosen, 'techdisc') else []
+    throws = []
+    if hasattr(chosen, 'techdisc'):
+        flags.refuse_launch(chosen, '--techdisc')
+        throws = techdisc.throws(chosen.techdisc)
     discs = getattr(chosen, 'discs', [chosen.disc])
     flown: dict[str, flight.Flight] = {}
     for disc in discs:

@@ -53,6 +53,7 @@ def parser(prog: str = 'identify') -> Parser:
     what.add_argument(
         '--disc',
         type=path,
+        action=flags.OneDisc,
         default=disc_file.DEFAULT_DISC,
         metavar='NAME|FILE.yaml|NUMBERS',
         help='disc to start from: its mass, size, I_z and the shape of its curves are kept',

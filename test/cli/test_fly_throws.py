@@ -220,6 +220,18 @@ def test_a_bad_file_of_a_techdisc_is_refused_in_one_line(fly, file, old, new, fr
     assert all(fragment in err for fragment in fragments), err
 
 
+@pytest.mark.parametrize(
+    ('flag', 'value'),
+    [('--speed', '60mph'), ('--throw', 'rhbh'), ('--hyzer', '5'), ('--advance-ratio', '0.3')],
+)
+def test_a_release_beside_those_of_a_techdisc_is_refused(fly, file, flag, value):
+    """It had no effect, and the table did not say so."""
+    code, out, err = fly('--techdisc', file(TECHDISC), flag, value)
+    assert (code, out, err.count('\n')) == (2, '', 1)
+    assert err.startswith(f'fly: error: {flag}: ')
+    assert '--techdisc gives the releases' in err
+
+
 def test_a_missing_file_of_a_techdisc_is_refused(fly, tmp_path):
     code, _, err = fly('--techdisc', tmp_path / 'no.csv')
     assert code == 2
