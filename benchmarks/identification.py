@@ -13,10 +13,10 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import DiscSimError
-from disc_sim_ros.estimation.coefficients import NAMES
-from disc_sim_ros.estimation.identification import Identification, identify
-from disc_sim_ros.estimation.observations import NOISE
-from disc_sim_ros.estimation.throws import RELEASE_SIZE
+from disc_sim_ros.estimation.identification.coefficients import NAMES
+from disc_sim_ros.estimation.identification.identify import Identification, identify
+from disc_sim_ros.estimation.identification.observations import NOISE
+from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.launch import Launch

@@ -14,11 +14,11 @@ import sys
 
 import numpy as np
 
-from disc_sim_ros.estimation.coefficients import NAMES, base_of
-from disc_sim_ros.estimation.crossvalidation import left_out_misses
-from disc_sim_ros.estimation.identification import Identification, identify
-from disc_sim_ros.estimation.observations import CAMERA, GYRO, POSITION, Camera
-from disc_sim_ros.estimation.throws import Throw
+from disc_sim_ros.estimation.identification.coefficients import NAMES, base_of
+from disc_sim_ros.estimation.identification.crossvalidation import left_out_misses
+from disc_sim_ros.estimation.identification.identify import Identification, identify
+from disc_sim_ros.estimation.identification.observations import CAMERA, GYRO, POSITION, Camera
+from disc_sim_ros.estimation.identification.throws import Throw
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup

@@ -8,7 +8,8 @@ import scratch
 
 from disc_sim_ros.analysis import techdisc
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import measured, throw_csv
+from disc_sim_ros.estimation import throw_csv
+from disc_sim_ros.estimation.identification import measured
 from disc_sim_ros.estimation.prediction import replay
 from disc_sim_ros.physics import disc_file
 from disc_sim_ros.physics.flight import Setup

@@ -21,8 +21,8 @@ from disc_sim_ros.quantities import COEFFICIENTS, IDENTIFICATION, LAUNCH, MEAN_W
 from disc_sim_ros.units import SYSTEMS
 
 if TYPE_CHECKING:
-    from disc_sim_ros.estimation.crossvalidation import LeftOut
-    from disc_sim_ros.estimation.identification import Identification
+    from disc_sim_ros.estimation.identification.crossvalidation import LeftOut
+    from disc_sim_ros.estimation.identification.identify import Identification
 
 _EVERY = 2.0  # s between two lines of progress
 
@@ -172,15 +172,19 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     throws = identify_input.throws(chosen, setup)
     identify_input.refuse_unused(chosen, noise, throws)
     # Imported once the input is known to be right: they take a second.
-    from disc_sim_ros.estimation import crossvalidation, identification, report  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification import (  # noqa: PLC0415
+        crossvalidation,
+        identify,
+        report,
+    )
     from disc_sim_ros.physics import sampled  # noqa: PLC0415
 
     if note := sampled.first_call_note():
         output.note(chosen.prog, note)
     n = len(throws)
-    stages = (*identification.stages(n, chosen.starts), *crossvalidation.stages(n))
+    stages = (*identify.stages(n, chosen.starts), *crossvalidation.stages(n))
     progress = _Progress(chosen.prog, stages)
-    result = identification.identify(
+    result = identify.identify(
         throws,
         setup,
         free=free,
@@ -219,7 +223,7 @@ def _write_outputs(
     provenance: Sequence[str],
 ) -> None:
     """Write the report and the disc file that were asked for, and name them."""
-    from disc_sim_ros.estimation import report  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification import report  # noqa: PLC0415
 
     written = []
     if hasattr(chosen, 'report'):

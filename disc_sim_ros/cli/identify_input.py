@@ -13,10 +13,10 @@ from disc_sim_ros.quantities import IDENTIFICATION
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from disc_sim_ros.estimation.problem import Prior
-    from disc_sim_ros.estimation.releases import ReleaseErrors
+    from disc_sim_ros.estimation.identification.problem import Prior
+    from disc_sim_ros.estimation.identification.releases import ReleaseErrors
+    from disc_sim_ros.estimation.identification.throws import Throw
     from disc_sim_ros.estimation.throw_csv import Columns
-    from disc_sim_ros.estimation.throws import Throw
     from disc_sim_ros.physics.thrower import Release
 
 USED = ('position', 'attitude', 'gyro')  # unless --use says otherwise
@@ -24,7 +24,7 @@ USED = ('position', 'attitude', 'gyro')  # unless --use says otherwise
 
 def throws(chosen: argparse.Namespace, setup: flight.Setup) -> 'list[Throw]':
     """Return the throws of all files, with their measured releases."""
-    from disc_sim_ros.estimation.measured import (  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification.measured import (  # noqa: PLC0415
         Instruments,
         check_different,
         throw_from,
@@ -68,7 +68,7 @@ def _releases(
     if not hasattr(chosen, 'techdisc'):
         return [None] * count
     from disc_sim_ros.analysis import techdisc  # noqa: PLC0415
-    from disc_sim_ros.estimation.releases import ReleaseErrors  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification.releases import ReleaseErrors  # noqa: PLC0415
 
     rows = techdisc.throws(chosen.techdisc)
     if len(rows) != count:
@@ -105,7 +105,7 @@ def refuse_unused(
 
 def free(chosen: argparse.Namespace) -> list[str] | None:
     """Return the coefficients of `--free`, checked before anything is compiled."""
-    from disc_sim_ros.estimation import coefficients  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification import coefficients  # noqa: PLC0415
 
     names = _listed(chosen, 'free')
     if names is not None:
@@ -115,7 +115,7 @@ def free(chosen: argparse.Namespace) -> list[str] | None:
 
 def noise(chosen: argparse.Namespace) -> dict[str, float]:
     """Return the standard errors of `--noise` by instrument."""
-    from disc_sim_ros.estimation.observations import NOISE  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification.observations import NOISE  # noqa: PLC0415
 
     of_each = {}
     for word in _listed(chosen, 'noise') or []:
@@ -138,8 +138,8 @@ def prior(chosen: argparse.Namespace) -> 'Prior':
     """Return what is believed of coefficients, wind and camera before the throws."""
     import numpy as np  # noqa: PLC0415
 
-    from disc_sim_ros.estimation.coefficients import NAMES  # noqa: PLC0415
-    from disc_sim_ros.estimation.problem import Prior  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification.coefficients import NAMES  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification.problem import Prior  # noqa: PLC0415
     from disc_sim_ros.quantities import COEFFICIENT_SPREAD  # noqa: PLC0415
 
     return Prior(

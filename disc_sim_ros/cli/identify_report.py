@@ -17,8 +17,8 @@ from disc_sim_ros.units import System
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from disc_sim_ros.estimation.crossvalidation import LeftOut
-    from disc_sim_ros.estimation.identification import Identification
+    from disc_sim_ros.estimation.identification.crossvalidation import LeftOut
+    from disc_sim_ros.estimation.identification.identify import Identification
 
 
 def provenance(chosen: argparse.Namespace, words: Sequence[str]) -> list[str]:
@@ -42,7 +42,7 @@ def write(
 
     The pages are in a system of units, report.json in SI units.
     """
-    from disc_sim_ros.estimation import plots, report  # noqa: PLC0415
+    from disc_sim_ros.estimation.identification import plots, report  # noqa: PLC0415
 
     figures = [
         plots.paths(result, system),

@@ -12,10 +12,10 @@ import pytest
 
 from disc_sim_ros.analysis import bag_analysis, flights, plots, recording
 from disc_sim_ros.bags.reader import open_bag
-from disc_sim_ros.estimation import plots as estimation_plots
-from disc_sim_ros.estimation import report
-from disc_sim_ros.estimation.coefficients import base_of
-from disc_sim_ros.estimation.identification import identify
+from disc_sim_ros.estimation.identification import plots as estimation_plots
+from disc_sim_ros.estimation.identification import report
+from disc_sim_ros.estimation.identification.coefficients import base_of
+from disc_sim_ros.estimation.identification.identify import identify
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup, fly

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
-from disc_sim_ros.estimation.fitting import solve
-from disc_sim_ros.estimation.observations import NOISE
-from disc_sim_ros.estimation.problem import Prior, Problem
-from disc_sim_ros.estimation.throws import throw_of
+from disc_sim_ros.estimation.identification.coefficients import NAMES, base_of, disc_with
+from disc_sim_ros.estimation.identification.fitting import solve
+from disc_sim_ros.estimation.identification.observations import NOISE
+from disc_sim_ros.estimation.identification.problem import Prior, Problem
+from disc_sim_ros.estimation.identification.throws import throw_of
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.launch import Launch

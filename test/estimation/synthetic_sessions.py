@@ -7,8 +7,8 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
-from disc_sim_ros.estimation.observations import (
+from disc_sim_ros.estimation.identification.coefficients import NAMES, base_of, disc_with
+from disc_sim_ros.estimation.identification.observations import (
     ACCELERATION,
     ATTITUDE,
     CAMERA,
@@ -22,8 +22,8 @@ from disc_sim_ros.estimation.observations import (
     Observation,
     Positions,
 )
-from disc_sim_ros.estimation.problem import Prior, Problem
-from disc_sim_ros.estimation.throws import Throw, throw_of
+from disc_sim_ros.estimation.identification.problem import Prior, Problem
+from disc_sim_ros.estimation.identification.throws import Throw, throw_of
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.frames import flip_yz

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation.identification import identify
-from disc_sim_ros.estimation.measured import Instruments, throw_from
+from disc_sim_ros.estimation.identification.identify import identify
+from disc_sim_ros.estimation.identification.measured import Instruments, throw_from
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 

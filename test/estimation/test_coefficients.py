@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import coefficients
-from disc_sim_ros.estimation.coefficients import NAMES, base_of, disc_with
+from disc_sim_ros.estimation.identification import coefficients
+from disc_sim_ros.estimation.identification.coefficients import NAMES, base_of, disc_with
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.launch import Launch

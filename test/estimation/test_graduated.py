@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import graduated, report
-from disc_sim_ros.estimation.fitting import fit_release, retry_releases, solve
-from disc_sim_ros.estimation.identification import Identification
-from disc_sim_ros.estimation.information import correlation
-from disc_sim_ros.estimation.normal_equations import cost_of_throw
-from disc_sim_ros.estimation.observations import GYRO
-from disc_sim_ros.estimation.problem import FINEST, Problem
-from disc_sim_ros.estimation.starting import DRAWN
+from disc_sim_ros.estimation.identification import graduated, report
+from disc_sim_ros.estimation.identification.fitting import fit_release, retry_releases, solve
+from disc_sim_ros.estimation.identification.identify import Identification
+from disc_sim_ros.estimation.identification.information import correlation
+from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
+from disc_sim_ros.estimation.identification.observations import GYRO
+from disc_sim_ros.estimation.identification.problem import FINEST, Problem
+from disc_sim_ros.estimation.identification.starting import DRAWN
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from estimation.synthetic_sessions import drawn, problem_of

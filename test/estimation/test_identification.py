@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import crossvalidation, report
-from disc_sim_ros.estimation.coefficients import NAMES, base_of
-from disc_sim_ros.estimation.identification import identify
-from disc_sim_ros.estimation.observations import NOISE, Positions
-from disc_sim_ros.estimation.problem import FINEST, Prior, Problem
-from disc_sim_ros.estimation.throws import Throw, throw_of
+from disc_sim_ros.estimation.identification import crossvalidation, report
+from disc_sim_ros.estimation.identification.coefficients import NAMES, base_of
+from disc_sim_ros.estimation.identification.identify import identify
+from disc_sim_ros.estimation.identification.observations import NOISE, Positions
+from disc_sim_ros.estimation.identification.problem import FINEST, Prior, Problem
+from disc_sim_ros.estimation.identification.throws import Throw, throw_of
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.environment import Wind
 from disc_sim_ros.physics.flight import Setup

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from disc_sim_ros.estimation import errors, information, marginal
-from disc_sim_ros.estimation.fitting import Best
-from disc_sim_ros.estimation.marginal import Point
+from disc_sim_ros.estimation.identification import errors, information, marginal
+from disc_sim_ros.estimation.identification.fitting import Best
+from disc_sim_ros.estimation.identification.marginal import Point
 from estimation.one_throw import damping_problem
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from disc_sim_ros.estimation.observations import (
+from disc_sim_ros.estimation.identification.observations import (
     Accelerations,
     Attitudes,
     Camera,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from disc_sim_ros.estimation import information, profile
-from disc_sim_ros.estimation.problem import Problem
+from disc_sim_ros.estimation.identification import information, profile
+from disc_sim_ros.estimation.identification.problem import Problem
 from estimation.one_throw import damping_problem
 
 

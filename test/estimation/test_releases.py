@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.releases import ReleaseErrors, release_covariance, release_state
+from disc_sim_ros.estimation.identification.releases import (
+    ReleaseErrors,
+    release_covariance,
+    release_state,
+)
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.thrower import Release
 

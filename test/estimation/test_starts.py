@@ -5,11 +5,11 @@ from functools import cache
 
 import pytest
 
-from disc_sim_ros.estimation import starting
-from disc_sim_ros.estimation.fitting import ALIKE, cost_of_throw, fitted_alone
-from disc_sim_ros.estimation.observations import GYRO
-from disc_sim_ros.estimation.problem import ROUGH
-from disc_sim_ros.estimation.starting import Search
+from disc_sim_ros.estimation.identification import starting
+from disc_sim_ros.estimation.identification.fitting import ALIKE, cost_of_throw, fitted_alone
+from disc_sim_ros.estimation.identification.observations import GYRO
+from disc_sim_ros.estimation.identification.problem import ROUGH
+from disc_sim_ros.estimation.identification.starting import Search
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from estimation.synthetic_sessions import drawn, problem_of

@@ -66,7 +66,12 @@ def test_the_import_rules_hold(tree):
         ),
         (
             'estimation/prediction',
-            f'import {PACKAGE}.estimation.fitting',
+            f'import {PACKAGE}.estimation.identification.fitting',
+            'predicting a landing and identifying a disc share only what measures',
+        ),
+        (
+            'estimation/identification',
+            f'import {PACKAGE}.estimation.prediction.prior',
             'predicting a landing and identifying a disc share only what measures',
         ),
         ('ros', f'import {PACKAGE}.cli', 'one direction, down to the physics'),

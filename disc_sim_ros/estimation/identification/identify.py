@@ -8,9 +8,16 @@ import numpy as np
 from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import coefficients, errors, information, marginal, profile, starting
-from disc_sim_ros.estimation.coefficients import NAMES, Base, base_of
-from disc_sim_ros.estimation.fitting import (
+from disc_sim_ros.estimation.identification import (
+    coefficients,
+    errors,
+    information,
+    marginal,
+    profile,
+    starting,
+)
+from disc_sim_ros.estimation.identification.coefficients import NAMES, Base, base_of
+from disc_sim_ros.estimation.identification.fitting import (
     BETTER,
     Best,
     Progress,
@@ -19,11 +26,11 @@ from disc_sim_ros.estimation.fitting import (
     retry_releases,
     solve,
 )
-from disc_sim_ros.estimation.information import Unidentifiable
-from disc_sim_ros.estimation.noise import HOPELESS, estimated_noise, refuse_misfit
-from disc_sim_ros.estimation.observations import NOISE
-from disc_sim_ros.estimation.problem import FINE, FINEST, ROUGH, Prior, Problem
-from disc_sim_ros.estimation.throws import Throw
+from disc_sim_ros.estimation.identification.information import Unidentifiable
+from disc_sim_ros.estimation.identification.noise import HOPELESS, estimated_noise, refuse_misfit
+from disc_sim_ros.estimation.identification.observations import NOISE
+from disc_sim_ros.estimation.identification.problem import FINE, FINEST, ROUGH, Prior, Problem
+from disc_sim_ros.estimation.identification.throws import Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.sampled import fly_sampled

@@ -6,10 +6,10 @@ import math
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.fitting import BETTER, Progress, solve
-from disc_sim_ros.estimation.normal_equations import cost_of_throw
-from disc_sim_ros.estimation.observations import GYRO
-from disc_sim_ros.estimation.problem import FINE, ROUGH, Problem
+from disc_sim_ros.estimation.identification.fitting import BETTER, Progress, solve
+from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
+from disc_sim_ros.estimation.identification.observations import GYRO
+from disc_sim_ros.estimation.identification.problem import FINE, ROUGH, Problem
 
 STAGE = 'errors'
 # Rise of the robust loss over that of the weighted squares that the information counts, of normal

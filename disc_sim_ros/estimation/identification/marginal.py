@@ -15,10 +15,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import information
-from disc_sim_ros.estimation.coefficients import NAMES
-from disc_sim_ros.estimation.fitting import Progress, solve
-from disc_sim_ros.estimation.problem import ROUGH, Problem
+from disc_sim_ros.estimation.identification import information
+from disc_sim_ros.estimation.identification.coefficients import NAMES
+from disc_sim_ros.estimation.identification.fitting import Progress, solve
+from disc_sim_ros.estimation.identification.problem import ROUGH, Problem
 
 STAGE = 'damping'
 DAMPING = NAMES.index('damping')

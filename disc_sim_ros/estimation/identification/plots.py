@@ -6,8 +6,8 @@ import numpy as np
 
 from disc_sim_ros import plot_axes
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.identification import Identification
-from disc_sim_ros.estimation.observations import UNITS, Camera, Positions
+from disc_sim_ros.estimation.identification.identify import Identification
+from disc_sim_ros.estimation.identification.observations import UNITS, Camera, Positions
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.units import METRIC, System

@@ -10,8 +10,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray, IntArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
-from disc_sim_ros.estimation.observations import (
+from disc_sim_ros.estimation.identification.observations import (
     ATTITUDE,
     CAMERA,
     GYRO,
@@ -23,7 +22,12 @@ from disc_sim_ros.estimation.observations import (
     Positions,
     until,
 )
-from disc_sim_ros.estimation.releases import ReleaseErrors, release_covariance, release_state
+from disc_sim_ros.estimation.identification.releases import (
+    ReleaseErrors,
+    release_covariance,
+    release_state,
+)
+from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.launch import Launch
 from disc_sim_ros.physics.thrower import Release

@@ -7,9 +7,9 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.estimation import information
-from disc_sim_ros.estimation.observations import NOISE, UNITS
-from disc_sim_ros.estimation.problem import Problem
+from disc_sim_ros.estimation.identification import information
+from disc_sim_ros.estimation.identification.observations import NOISE, UNITS
+from disc_sim_ros.estimation.identification.problem import Problem
 
 HOPELESS = 3.0  # margin of `refuse_misfit` with which a first fit is refused already
 _NORMAL = 1.4826  # standard deviation over median of the absolute values, of normal numbers

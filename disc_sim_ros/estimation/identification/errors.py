@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import information, marginal, profile
-from disc_sim_ros.estimation.fitting import Best, Progress, solve
-from disc_sim_ros.estimation.problem import Problem
+from disc_sim_ros.estimation.identification import information, marginal, profile
+from disc_sim_ros.estimation.identification.fitting import Best, Progress, solve
+from disc_sim_ros.estimation.identification.problem import Problem
 
 _PROFILES = 4  # at most: one may meet parameters that fit better
 

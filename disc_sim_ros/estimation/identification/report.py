@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from disc_sim_ros.estimation import coefficients, information
-from disc_sim_ros.estimation.coefficients import NAMES
-from disc_sim_ros.estimation.crossvalidation import LeftOut
-from disc_sim_ros.estimation.identification import Identification
-from disc_sim_ros.estimation.observations import UNITS
+from disc_sim_ros.estimation.identification import coefficients, information
+from disc_sim_ros.estimation.identification.coefficients import NAMES
+from disc_sim_ros.estimation.identification.crossvalidation import LeftOut
+from disc_sim_ros.estimation.identification.identify import Identification
+from disc_sim_ros.estimation.identification.observations import UNITS
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.disc_file import disc_document
 from disc_sim_ros.quantities import COEFFICIENTS

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import graduated, information
-from disc_sim_ros.estimation.fitting import (
+from disc_sim_ros.estimation.identification import graduated, information
+from disc_sim_ros.estimation.identification.fitting import (
     ALIKE,
     Alone,
     Best,
@@ -19,7 +19,7 @@ from disc_sim_ros.estimation.fitting import (
     retry_releases,
     solve,
 )
-from disc_sim_ros.estimation.problem import ROUGH, Problem
+from disc_sim_ros.estimation.identification.problem import ROUGH, Problem
 from disc_sim_ros.threads import Threads
 
 _SPREAD = 0.5  # of the prior: how far other starts lie

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.problem import Problem
+from disc_sim_ros.estimation.identification.problem import Problem
 from disc_sim_ros.threads import Threads
 
 _CORNER = 2.5  # standard deviations at which the loss of a residual turns from square to straight

@@ -10,7 +10,7 @@ from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.observations import (
+from disc_sim_ros.estimation.identification.observations import (
     Accelerations,
     Attitudes,
     Camera,
@@ -18,9 +18,9 @@ from disc_sim_ros.estimation.observations import (
     Observation,
     Positions,
 )
-from disc_sim_ros.estimation.releases import ReleaseErrors
+from disc_sim_ros.estimation.identification.releases import ReleaseErrors
+from disc_sim_ros.estimation.identification.throws import Throw, throw_of
 from disc_sim_ros.estimation.throw_csv import Columns
-from disc_sim_ros.estimation.throws import Throw, throw_of
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.thrower import Release

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.fitting import Progress, solve
-from disc_sim_ros.estimation.identification import Identification
-from disc_sim_ros.estimation.observations import FEWEST, Camera, Positions
-from disc_sim_ros.estimation.problem import Prior, Problem
+from disc_sim_ros.estimation.identification.fitting import Progress, solve
+from disc_sim_ros.estimation.identification.identify import Identification
+from disc_sim_ros.estimation.identification.observations import FEWEST, Camera, Positions
+from disc_sim_ros.estimation.identification.problem import Prior, Problem
 
 _WATCHED = 0.3  # share of a throw from which its release is fitted
 _KNOWN = 1e-3  # deviation of a wind that other throws told [m/s]

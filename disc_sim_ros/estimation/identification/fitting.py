@@ -9,8 +9,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import local
-from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
-from disc_sim_ros.estimation.normal_equations import (
+from disc_sim_ros.estimation.identification.normal_equations import (
     cost_of_throw,
     each,
     linear_blocks,
@@ -19,9 +18,10 @@ from disc_sim_ros.estimation.normal_equations import (
     solved,
     weights,
 )
-from disc_sim_ros.estimation.observations import ATTITUDE, GYRO
-from disc_sim_ros.estimation.problem import ROUGH, Problem
-from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw
+from disc_sim_ros.estimation.identification.observations import ATTITUDE, GYRO
+from disc_sim_ros.estimation.identification.problem import ROUGH, Problem
+from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE, Throw
+from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
 
 _SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
 _HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone

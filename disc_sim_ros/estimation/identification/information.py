@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.coefficients import NAMES
-from disc_sim_ros.estimation.normal_equations import weights
-from disc_sim_ros.estimation.problem import Problem
+from disc_sim_ros.estimation.identification.coefficients import NAMES
+from disc_sim_ros.estimation.identification.normal_equations import weights
+from disc_sim_ros.estimation.identification.problem import Problem
 
 _BY_CHANCE = 3.0  # standard deviations of a correlation that white noise exceeds in 1 of 700 fits
 _CORRELATED = 0.3  # of neighbouring residuals, from which on standard errors are widened

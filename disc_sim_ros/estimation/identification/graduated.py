@@ -14,23 +14,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation.coefficients import NAMES
-from disc_sim_ros.estimation.fitting import (
+from disc_sim_ros.estimation.identification.coefficients import NAMES
+from disc_sim_ros.estimation.identification.fitting import (
     BETTER,
     Progress,
     promising,
     retry_releases,
     starts,
 )
-from disc_sim_ros.estimation.normal_equations import (
+from disc_sim_ros.estimation.identification.normal_equations import (
     Block,
     costs_of_throw,
     each,
     linear_blocks,
     reduced,
 )
-from disc_sim_ros.estimation.problem import FINE, ROUGH, Problem
-from disc_sim_ros.estimation.throws import RELEASE_SIZE
+from disc_sim_ros.estimation.identification.problem import FINE, ROUGH, Problem
+from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE
 from disc_sim_ros.quantities import COEFFICIENTS
 
 _FACTORS = (100.0, 30.0, 10.0, 5.0, 3.0, 2.0)  # on the noise, before the noise itself

@@ -12,10 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
-from disc_sim_ros.estimation import coefficients, local
-from disc_sim_ros.estimation.coefficients import Base
-from disc_sim_ros.estimation.observations import CAMERA
-from disc_sim_ros.estimation.throws import RELEASE_SIZE, Throw
+from disc_sim_ros.estimation import local
+from disc_sim_ros.estimation.identification import coefficients
+from disc_sim_ros.estimation.identification.coefficients import Base
+from disc_sim_ros.estimation.identification.observations import CAMERA
+from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE, Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.rows import AT
 from disc_sim_ros.physics.sampled import default_row, fly_sampled, good_step

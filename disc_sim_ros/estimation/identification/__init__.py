@@ -1,0 +1,1 @@
+"""The coefficients of a disc, from measured throws."""
