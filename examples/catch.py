@@ -100,11 +100,13 @@ class Catcher(Node):
         self._pose.publish(pose)
 
     def is_ready(self) -> bool:
-        """Return True if the predictor and the simulator are there."""
+        """Return True if the simulator is there, and a predictor that measures its disc."""
+        predictors = self.get_publishers_info_by_topic(PredictorTopic.LANDING)
+        measuring = {end.node_name for end in self.get_subscriptions_info_by_topic(ODOM)}
         return (
             self.disc is not None
             and self.throw.service_is_ready()
-            and self.count_publishers(PredictorTopic.LANDING) > 0
+            and any(end.node_name in measuring for end in predictors)
         )
 
 
