@@ -64,14 +64,16 @@ def test_drawn_beliefs_find_what_those_of_the_problem_do_not():
 
 
 def test_ends_are_compared_in_steps_that_follow_the_flight():
-    """In session 603 an end in rough steps had a cost of 1,399, and 12,597 in fine ones.
+    """Of two fast throws an end in rough steps has a cost of 588, and of 9,957 in the finest.
 
-    Fits that began at it were lost.
+    Fits that began at such an end of session 603 were lost.
     """
     problem, _, _ = session(603)
-    end = graduated.search(problem, problem.means[: problem.shared])
+    fast = tuple(throw for throw in problem.throws if throw.start[12] > 68.0)
+    assert len(fast) == 2
+    end = graduated.search(replace(problem, throws=fast), problem.means[: problem.shared])
     finest = replace(end.problem, margin=FINEST)
-    in_finest = sum(cost_of_throw(finest, k, finest.here(k, end.x)) for k in range(5))
+    in_finest = sum(cost_of_throw(finest, k, finest.here(k, end.x)) for k in range(2))
     assert in_finest < 2.0 * end.cost
 
 
