@@ -4,12 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import graduated, report
 from disc_sim_ros.estimation.identification.fitting import fit_release, retry_releases, solve
 from disc_sim_ros.estimation.identification.identify import Identification
-from disc_sim_ros.estimation.identification.information import correlation
+from disc_sim_ros.estimation.identification.information import (
+    CHI_SQUARED,
+    LAGS,
+    correlation,
+    correlation_of,
+)
 from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
 from disc_sim_ros.estimation.identification.observations import GYRO
 from disc_sim_ros.estimation.identification.problem import FINEST, Problem
@@ -93,6 +99,23 @@ def test_a_thorough_search_leaves_the_minimum_of_most_starts():
 
     assert cost(thorough=False) > enough + 20.0  # or this throw no longer shows it
     assert cost(thorough=True) < enough + 1.0
+
+
+def test_the_limit_of_chance_is_that_of_1_in_700():
+    assert chi2.isf(1.0 / 700.0, LAGS) == pytest.approx(CHI_SQUARED, abs=0.05)
+    generator = np.random.default_rng(0)
+    white = [correlation_of([generator.standard_normal((150, 3))]) for _ in range(1000)]
+    assert sum(not each.is_chance for each in white) < 10  # 2.9 expected, of both limits
+
+
+def test_residuals_that_swing_are_no_chance_although_neighbours_do_not_correlate():
+    """They turn by a quarter between samples, as a wobble of 94 rad/s does at 60 Hz."""
+    swing = 0.5 * np.cos(0.5 * np.pi * np.arange(300))[:, np.newaxis]
+    noise = np.random.default_rng(1).standard_normal((300, 3))
+    swinging = correlation_of([noise + swing])
+    assert abs(swinging.rho) < 3.0 * swinging.chance
+    assert not swinging.is_chance
+    assert correlation_of([noise]).is_chance
 
 
 def test_correlated_residuals_are_no_chance_and_reported():

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from disc_sim_ros.estimation.identification.normal_equations import weights
 from disc_sim_ros.estimation.identification.problem import Problem
 
 _BY_CHANCE = 3.0  # standard deviations of a correlation that white noise exceeds in 1 of 700 fits
+# Samples over which correlations are looked for, and the chi squared of so many degrees of freedom
+# that 1 of 700 exceeds (test/estimation/test_graduated.py).
+LAGS, CHI_SQUARED = 10, 28.6
 _CORRELATED = 0.3  # of neighbouring residuals, from which on standard errors are widened
 
 
@@ -91,33 +95,52 @@ class Correlation:
     """How residuals that follow each other in time are correlated.
 
     Attributes:
-        rho: Mean correlation of all instruments and throws.
+        rho: Correlation of neighbours, mean of all instruments and throws.
         chance: Standard deviation of it for white noise.
+        squares: Sum of the squared correlations over 1 to LAGS samples, in squares of their
+            standard deviations for white noise (Box and Pierce, 1970). Residuals of a wrong
+            minimum swing as the disc turns, so that those of neighbours may cancel.
     """
 
     rho: float
     chance: float
+    squares: float
 
     @property
     def is_chance(self) -> bool:
-        """Return True if white noise gives as much in all but 1 of 700 fits."""
-        return self.rho < _BY_CHANCE * self.chance
+        """Return True if white noise gives as much in all but 1 of 700 fits, each of both."""
+        return self.rho < _BY_CHANCE * self.chance and self.squares < CHI_SQUARED
 
 
 def correlation(problem: Problem, x: FloatArray) -> Correlation:
-    """Return the correlation of neighbouring residuals at the parameters `x`."""
-    products = squares = 0.0
-    count = 0
-    for k in range(len(problem.throws)):
-        here = problem.here(k, x)[np.newaxis]
-        throw = problem.throws[k]
-        for o, r in zip(throw.observations, problem.predictions(k, here), strict=True):
-            whitened = np.clip(r[0] / problem.noise[o.kind], -3.0, 3.0)
-            products += float((whitened[1:] * whitened[:-1]).sum())
-            squares += float((whitened[1:] ** 2).sum())
-            count += whitened[1:].size
-    rho = min(products / squares, 0.99) if squares > 0.0 else 0.0
-    return Correlation(rho, 1.0 / np.sqrt(max(count, 1)))
+    """Return how residuals that follow each other are correlated at the parameters `x`."""
+    whitened = []
+    for k, throw in enumerate(problem.throws):
+        parts = problem.predictions(k, problem.here(k, x)[np.newaxis])
+        whitened += [
+            r[0] / problem.noise[o.kind] for o, r in zip(throw.observations, parts, strict=True)
+        ]
+    return correlation_of(whitened)
+
+
+def correlation_of(series: Sequence[FloatArray]) -> Correlation:
+    """Return how samples that follow each other are correlated.
+
+    Args:
+        series: One for each throw and instrument, in standard deviations, each (n, d). Values
+            beyond three count as three.
+    """
+    products, squares, counts = np.zeros((3, LAGS))
+    for whole in series:
+        values = np.clip(whole, -3.0, 3.0)
+        for lag in range(1, min(LAGS, len(values) - 1) + 1):
+            later, earlier = values[lag:], values[:-lag]
+            products[lag - 1] += float((later * earlier).sum())
+            squares[lag - 1] += float((later**2).sum())
+            counts[lag - 1] += later.size
+    rho = products / np.where(squares > 0.0, squares, np.inf)
+    chance = 1.0 / math.sqrt(max(counts[0], 1.0))
+    return Correlation(min(float(rho[0]), 0.99), chance, float((rho**2 * counts).sum()))
 
 
 def _widening(problem: Problem, x: FloatArray) -> float:

@@ -88,14 +88,15 @@ def text(result: Identification, left_out: Sequence[LeftOut], system: System = M
 
 
 def _pattern(result: Identification) -> list[str]:
-    """Return a line about a correlation too weak to widen errors and too strong for chance."""
+    """Return a line about correlations too weak to widen errors and too strong for chance."""
     between = information.correlation(result.problem, result.x)
     if between.is_chance:
         return []
     return [
         f'  neighbouring residuals correlate by {between.rho:.2f}, white noise by '
-        f'{between.chance:.2f} at random: something is not modelled, or another solution fits '
-        'better than the one found'
+        f'{between.chance:.2f} at random; the squares of {information.LAGS} lags sum to '
+        f'{between.squares:.0f}, of white noise to at most {information.CHI_SQUARED:.0f}: '
+        'something is not modelled, or another solution fits better than the one found'
     ]
 
 

@@ -25,6 +25,7 @@ from disc_sim_ros.threads import Threads
 _SPREAD = 0.5  # of the prior: how far other starts lie
 _STEPS = 12
 DRAWN = 12  # graduated searches with drawn beliefs, while residuals are not white
+_NEAR = 60.0  # half squares above the best end: what two releases in wrong minima may cost
 _RELEASES = 'releases'
 
 
@@ -134,7 +135,8 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
         if information.correlation(end.problem, end.x).is_chance:
             break
         other = graduated.search(problem, shared, search.progress, _RELEASES, generator)
-        end = min(end, graduated.settled(other), key=lambda e: e.cost)
+        if other.cost < end.cost + _NEAR:
+            end = min(end, graduated.settled(other), key=lambda e: e.cost)
     return end.problem, end.x
 
 
