@@ -1,6 +1,5 @@
 """Releases in wrong local minima: a throw that fits alone shows where the others belong."""
 
-from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -8,7 +7,6 @@ import pytest
 from disc_sim_ros.estimation.identification import starting
 from disc_sim_ros.estimation.identification.fitting import ALIKE, cost_of_throw, fitted_alone
 from disc_sim_ros.estimation.identification.observations import GYRO
-from disc_sim_ros.estimation.identification.problem import ROUGH
 from disc_sim_ros.estimation.identification.starting import Search
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
@@ -30,7 +28,6 @@ def test_a_throw_in_a_wrong_minimum_is_found_with_the_coefficients_of_one_that_f
 
     monkeypatch.setattr(starting, 'fitted_alone', once)
     problem, x = starting.fitted_apart(problem, Search(1, 0))
-    problem = replace(problem, margin=ROUGH)
     for k in range(2):
         here = problem.here(k, x)
         # Half a square for each residual of noise alone.

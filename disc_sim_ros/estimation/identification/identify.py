@@ -29,7 +29,7 @@ from disc_sim_ros.estimation.identification.fitting import (
 from disc_sim_ros.estimation.identification.information import Unidentifiable
 from disc_sim_ros.estimation.identification.noise import HOPELESS, estimated_noise, refuse_misfit
 from disc_sim_ros.estimation.identification.observations import NOISE
-from disc_sim_ros.estimation.identification.problem import FINE, FINEST, ROUGH, Prior, Problem
+from disc_sim_ros.estimation.identification.problem import FINE, FINEST, Prior, Problem
 from disc_sim_ros.estimation.identification.throws import Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import paper_from_map
@@ -271,7 +271,7 @@ def _without_each(
         rest = replace(problem, throws=tuple(t for i, t in enumerate(problem.throws) if i != k))
         stage = _without_stage(k, n)
         shared = solve(
-            replace(rest, margin=ROUGH),
+            replace(rest, margin=rest.roughest),
             np.delete(x, np.r_[problem.own(k)]),
             most_steps=_STEPS_WITHOUT,
             progress=progress,

@@ -15,7 +15,7 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import local
 from disc_sim_ros.estimation.identification import coefficients
 from disc_sim_ros.estimation.identification.coefficients import Base
-from disc_sim_ros.estimation.identification.observations import CAMERA
+from disc_sim_ros.estimation.identification.observations import CAMERA, GYRO
 from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE, Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.rows import AT
@@ -88,6 +88,14 @@ class Problem:
     def has_camera(self) -> bool:
         """Return True if a camera tracked a throw."""
         return any(o.kind == CAMERA for throw in self.throws for o in throw.observations)
+
+    @property
+    def roughest(self) -> float:
+        """Return the margin with which minima may be compared.
+
+        Rough steps misread a gyro by several times its noise where the spin is fast.
+        """
+        return FINE if any(throw.has(GYRO) for throw in self.throws) else ROUGH
 
     @property
     def turns_only(self) -> bool:

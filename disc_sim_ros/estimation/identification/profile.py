@@ -8,8 +8,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification.fitting import BETTER, Progress, solve
 from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
-from disc_sim_ros.estimation.identification.observations import GYRO
-from disc_sim_ros.estimation.identification.problem import FINE, ROUGH, Problem
+from disc_sim_ros.estimation.identification.problem import Problem
 
 STAGE = 'errors'
 # Rise of the robust loss over that of the weighted squares that the information counts, of normal
@@ -53,8 +52,7 @@ def profiled(
     Returns:
         The profile. It ends at the first parameters that fit better.
     """
-    gyro = any(throw.has(GYRO) for throw in problem.throws)
-    problem = replace(problem, margin=FINE if gyro else ROUGH)
+    problem = replace(problem, margin=problem.roughest)
     low, high = problem.bounds
     x = solve(problem, x, most_steps=2).x
     lowest = _cost(problem, x)

@@ -19,7 +19,7 @@ from disc_sim_ros.estimation.identification.fitting import (
     retry_releases,
     solve,
 )
-from disc_sim_ros.estimation.identification.problem import ROUGH, Problem
+from disc_sim_ros.estimation.identification.problem import Problem
 from disc_sim_ros.threads import Threads
 
 _SPREAD = 0.5  # of the prior: how far other starts lie
@@ -88,7 +88,7 @@ def fitted_apart(problem: Problem, search: Search) -> tuple[Problem, FloatArray]
     x[: problem.shared] = np.median([alone.shared for alone in fitted], axis=0)
     least = min(alone.loss for alone in fitted)
     good = [alone for alone in fitted if alone.loss < ALIKE * least]
-    problem = replace(problem, margin=ROUGH)
+    problem = replace(problem, margin=problem.roughest)
     return (problem, x) if len(good) == len(fitted) else _agreeing(problem, x, good)
 
 
