@@ -10,6 +10,7 @@ import re
 
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.files import reason
+from disc_sim_ros.validation import as_number
 
 SEPARATORS = (',', ';', '\t')
 _SEP = re.compile(f'sep=([{"".join(SEPARATORS)}])\\s*', re.IGNORECASE)
@@ -66,10 +67,8 @@ class Table:
     def number(self, cell: str) -> float | None:
         """Return the number in a cell, which may be nan or infinite; None if it holds none."""
         text = cell if self.separator == ',' or '.' in cell else cell.replace(',', '.')
-        try:
-            return float(text)
-        except ValueError:
-            return None
+        number = as_number(text)
+        return number if isinstance(number, float) else None
 
     def lacks(self, needed: str, missing: Sequence[str], known: Sequence[str]) -> ConfigError:
         """Return the error that columns are missing.

@@ -185,6 +185,14 @@ def choice(thing: str, value: object, allowed: Collection[str]) -> str:
     return value
 
 
+def as_number(text: str) -> float | str:
+    """Return text as a number; as text where it is none, or one in Python's syntax alone: 1_5."""
+    try:
+        return text if '_' in text else float(text)
+    except ValueError:
+        return text
+
+
 def text(thing: str, value: object) -> str:
     """Return a text as one line that is safe to show on a terminal.
 

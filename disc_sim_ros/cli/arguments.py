@@ -7,7 +7,7 @@ import os
 import re
 from typing import Any, NoReturn
 
-from disc_sim_ros import units
+from disc_sim_ros import units, validation
 from disc_sim_ros.errors import ConfigError, brief, printable
 from disc_sim_ros.validation import Quantity
 
@@ -194,14 +194,6 @@ def _metavar(quantity: Quantity) -> str:
     return {'': 'X', 'degrees': 'DEG'}.get(quantity.unit, quantity.unit.upper().replace('^', ''))
 
 
-def _number(text: str) -> float | str:
-    """Return text as a number; as text where Python's syntax of numbers is not a user's: 1_5."""
-    try:
-        return text if '_' in text else float(text)
-    except ValueError:
-        return text
-
-
 def _in_unit(text: str, quantity: Quantity) -> float | str:
     """Return the number of a text such as '60mph', in the unit of the quantity.
 
@@ -210,8 +202,8 @@ def _in_unit(text: str, quantity: Quantity) -> float | str:
     """
     digits, unit = units.split(text)
     if not unit:
-        return _number(text)
-    number = _number(digits)
+        return validation.as_number(text)
+    number = validation.as_number(digits)
     factor = units.UNITS.get(quantity.unit, {}).get(unit)
     if factor is None and isinstance(number, float):
         allowed = units.spellings(quantity.unit)

@@ -123,10 +123,7 @@ def noise(chosen: argparse.Namespace) -> dict[str, float]:
         validation.choice('--noise', name, NOISE)
         if name in of_each:
             raise ConfigError('--noise', name, 'name each instrument once')
-        try:
-            value: float | str = float(number)
-        except ValueError:
-            value = number
+        value = validation.as_number(number)
         try:
             of_each[name] = IDENTIFICATION['noise'].check(value)
         except ConfigError as error:

@@ -98,9 +98,10 @@ def _run(chosen: argparse.Namespace) -> int:
     if not throws:
         ask = 'are positions in m with z up, and times in s, in their order?'
         raise DiscSimError(f'{chosen.source}: no throw in {count} measurements; {ask}')
-    for name in recordings if len(recordings) > 1 else ():
-        if not any(throw.name.removesuffix(', 1') == name for throw in throws):
-            lost = len(recordings[name])
+    followed = {throw.recording for throw in throws}
+    for name, measurements in recordings.items():
+        if name not in followed:
+            lost = len(measurements)
             output.note(chosen.prog, f'{name}: not recognised as a throw, {lost} measurements')
     if chosen.json:
         document = {'throws': [_document(throw, config.discs) for throw in throws]}

@@ -6,7 +6,7 @@ from pathlib import Path
 import sys
 
 from disc_sim_ros.errors import ConfigError
-from disc_sim_ros.validation import Quantity
+from disc_sim_ros.validation import Quantity, as_number
 
 OWN = 'sim.'  # before parameters such as `model`, which other launch files have as arguments
 
@@ -22,11 +22,7 @@ def number(name: str, text: str, quantity: Quantity) -> float:
     Raises:
         ConfigError: It is no number, or out of the range of the quantity.
     """
-    try:
-        value: float | str = float(text)
-    except ValueError:
-        value = text
-    checked: float = quantity.check(value, name)
+    checked: float = quantity.check(as_number(text), name)
     return checked
 
 

@@ -18,7 +18,12 @@ KNOWN = Instruments(gravity=9.81, spin=60.0)
 @pytest.mark.parametrize(
     ('kind', 't', 'values', 'message'),
     [
-        ('radar', T, PATH, "instrument: 'radar' .* choose from position, camera"),
+        (
+            'radar',
+            T,
+            PATH,
+            "instrument: 'radar' .* choose from position, attitude, gyro, acceleration, camera",
+        ),
         ('position', T, PATH[:5], r'position: .*\(20,\) and \(5, 3\).* shape \(n, 3\)'),
         ('position', T, PATH[:, :2], r'position: .* values of shape \(n, 3\)'),
         ('attitude', T, PATH, r'attitude: .* values of shape \(n, 4\)'),

@@ -76,6 +76,7 @@ def test_a_file_reads_the_same_however_its_cells_are_separated(tmp_path, content
         (text(comma=True), 'line 2: .* semicolons between the cells'),
         (PLAIN.replace('2,0.1', ',0.1'), "line 7: throw: '' .* name"),
         (text(';', comma=True).replace('3,25', '1.003,25'), "line 5: x_m: '1.003,25' .* finite"),
+        (PLAIN.replace('1,0.2', '1,1_2'), "line 4: t_s: '1_2' .* finite number, or nothing"),
         (PLAIN.replace('1,0.2', '1,nan'), "line 4: t_s: 'nan' .* finite number, or nothing"),
         (PLAIN.replace('1,0.2', '1,"0.2'), "line 4: '2 cells' .* has 5"),
         ('1,0.2\n', 'it needs a column t_s'),

@@ -222,7 +222,7 @@ def test_the_throw_waits_for_the_recorder(load):
     assert len(module.record_and_throw(given)) == 1
 
 
-@pytest.mark.parametrize('value', ['abc', 'nan', '5000', ''])
+@pytest.mark.parametrize('value', ['abc', 'nan', '5000', '', '1_5'])
 @pytest.mark.parametrize(
     ('file', 'make', 'name'),
     [

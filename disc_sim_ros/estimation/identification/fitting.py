@@ -230,31 +230,20 @@ def retry_releases(
         The problem with changes counted from the best first states, the parameters there, and
         whether one of them is better than before.
     """
-    losses = [
-        float(robust_loss(problem.residuals(k, problem.here(k, x))).mean())
-        for k in range(len(problem.throws))
-    ]
+    kept = [] if thorough else _kept(problem, x)
 
     def retried(k: int) -> tuple[Throw, FloatArray, bool]:
-        throw, here = problem.throws[k], problem.here(k, x)
-        if k not in which:
-            return throw, here, False
-        cost = cost_of_throw(problem, k, here)
-        states, _, _ = problem.states_and_rows(k, here[np.newaxis])
-        kept = _MORE_KEPT if losses[k] > ALIKE * min(losses) else KEPT
-        near = starts(throw) + _neighbours(states[0])
-        candidates = (
-            _of_each_attitude(problem, k, here)
-            if thorough
-            else promising(problem, k, here, near, kept)
-        )
-        fits = [_fitted_from(problem, k, here, state) for state in candidates]
-        if thorough:
-            fits = [fit.going_on() for fit in sorted(fits, key=lambda f: f.cost)[:_GOING_ON]]
-        least = min(fits, key=lambda f: f.cost)
-        if least.cost >= cost - BETTER:
-            return throw, here, False
-        return least.problem.throws[0], least.here, True
+        here = problem.here(k, x)
+        if k in which:
+            fits = (
+                _fits_of_each_attitude(problem, k, here)
+                if thorough
+                else _fits_near(problem, k, here, kept[k])
+            )
+            least = min(fits, key=lambda fit: fit.cost)
+            if least.cost < cost_of_throw(problem, k, here) - BETTER:
+                return least.problem.throws[0], least.here, True
+        return problem.throws[k], here, False
 
     results = each(problem, retried)
     problem = replace(problem, throws=tuple(throw for throw, _, _ in results))
@@ -288,6 +277,30 @@ def _fitted_from(problem: Problem, k: int, here: FloatArray, state: FloatArray) 
     alone = replace(problem, throws=(problem.throws[k].starting_at(state),))
     first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
     return _Fit(alone, *fit_release(alone, 0, first))
+
+
+def _kept(problem: Problem, x: FloatArray) -> list[int]:
+    """Return how many starts of each throw to fit: more if it fits worse than others."""
+    losses = [
+        float(robust_loss(problem.residuals(k, problem.here(k, x))).mean())
+        for k in range(len(problem.throws))
+    ]
+    return [_MORE_KEPT if loss > ALIKE * min(losses) else KEPT for loss in losses]
+
+
+def _fits_near(problem: Problem, k: int, here: FloatArray, kept: int) -> list[_Fit]:
+    """Return fits of throw `k` from the starts that fit best as they are."""
+    states, _, _ = problem.states_and_rows(k, here[np.newaxis])
+    candidates = starts(problem.throws[k]) + _neighbours(states[0])
+    best = promising(problem, k, here, candidates, kept)
+    return [_fitted_from(problem, k, here, state) for state in best]
+
+
+def _fits_of_each_attitude(problem: Problem, k: int, here: FloatArray) -> list[_Fit]:
+    """Return the best fits of throw `k` from one start of each attitude, after more steps."""
+    first = _of_each_attitude(problem, k, here)
+    fits = [_fitted_from(problem, k, here, state) for state in first]
+    return [fit.going_on() for fit in sorted(fits, key=lambda fit: fit.cost)[:_GOING_ON]]
 
 
 def promising(

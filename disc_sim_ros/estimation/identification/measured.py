@@ -20,13 +20,13 @@ from disc_sim_ros.estimation.identification.observations import (
 )
 from disc_sim_ros.estimation.identification.releases import ReleaseErrors
 from disc_sim_ros.estimation.identification.throws import Throw, throw_of
-from disc_sim_ros.estimation.throw_csv import Columns
+from disc_sim_ros.estimation.throw_csv import CAMERA_COLUMNS, GROUPS, Columns
 from disc_sim_ros.physics.disc import Disc
 from disc_sim_ros.physics.frames import paper_from_map
 from disc_sim_ros.physics.thrower import Release
 from disc_sim_ros.quantities import LAUNCH
 
-_COMPONENTS = {'position': 3, 'camera': 2, 'attitude': 4, 'gyro': 3, 'acceleration': 3}
+_COLUMNS = {**GROUPS, 'camera': CAMERA_COLUMNS}
 _FEWEST = 8  # samples of an instrument
 _FASTEST = 60.0  # m/s; the longest throws are released at 40
 _SLOWEST, _SHORTEST_PATH = 3.0, 2.0  # m/s, m: below, nothing was thrown
@@ -129,8 +129,8 @@ def _observation(
 
 
 def _check_columns(name: str, kind: str, t: FloatArray, values: FloatArray) -> None:
-    validation.choice(f'{name}: instrument', kind, _COMPONENTS)
-    width = _COMPONENTS[kind]
+    validation.choice(f'{name}: instrument', kind, _COLUMNS)
+    width = len(_COLUMNS[kind])
     if t.ndim != 1 or values.shape != (len(t), width):
         allowed = f'give times of shape (n,) and values of shape (n, {width})'
         raise ConfigError(f'{name}: {kind}', f'shapes {t.shape} and {values.shape}', allowed)

@@ -115,7 +115,7 @@ def _agreeing(
 def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
     """Return the best end of graduated searches, see `graduated`.
 
-    In a wrong minimum neighbouring residuals are usually correlated. Then more searches follow.
+    In a wrong minimum residuals are usually correlated. Then more searches follow.
     """
     n = len(problem.free)
     ends: list[graduated.End] = []

@@ -29,6 +29,7 @@ class FollowedThrow:
 
     Attributes:
         number: From 1.
+        recording: Name of its recording.
         name: For people: that of its recording, where there are several, or `throw 1`.
         predictions: In the order of the measurements. Each has the covariance of the last
             ellipse, as `predictor_node` publishes it.
@@ -36,6 +37,7 @@ class FollowedThrow:
     """
 
     number: int
+    recording: str
     name: str
     predictions: tuple[Prediction, ...]
     measurements: tuple[Measurement, ...]
@@ -91,7 +93,7 @@ def replay(
             name = f'throw {number}'
             if len(recordings) > 1:
                 name = recording if len(replayed) == 1 else f'{recording}, {k}'
-            throws.append(FollowedThrow(number, name, predictions, measured))
+            throws.append(FollowedThrow(number, recording, name, predictions, measured))
     return throws
 
 
