@@ -70,6 +70,7 @@ class Catcher(Node):
         self.target: tuple[float, float] | None = None
         self.disc: tuple[float, float, float] | None = None
         self.is_down = False
+        self._has_flown = False
         self._pose = self.create_publisher(PoseStamped, 'robot_pose', STATE_QOS)
         self.throw = self.create_client(Trigger, 'sim_node/throw')
         self.create_subscription(
@@ -86,7 +87,8 @@ class Catcher(Node):
         at, speed = message.pose.pose.position, message.twist.twist.linear
         self.disc = (at.x, at.y, at.z)
         moving = bool(speed.x or speed.y or speed.z)
-        self.is_down = self.target is not None and not moving
+        self._has_flown = self._has_flown or moving
+        self.is_down = self._has_flown and not moving
 
     def _move(self) -> None:
         if self.target is None or self.is_down:

@@ -15,8 +15,10 @@ import pytest
 pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 import numpy as np
+import rclpy
 
 from disc_sim_ros import topics
 from disc_sim_ros.bags.reader import open_bag
@@ -171,6 +173,25 @@ def test_a_robot_runs_to_the_predicted_landing_and_catches_the_disc(ros, tmp_pat
         at = (X - 6.0, -Y - 5.0)  # in map
         assert run('catch.py', '--at', *map(str, at)).endswith('caught\n')
         predictor.end()
+
+
+def test_a_disc_that_rests_is_down_only_after_it_flew(load):
+    """A state from before the throw may be taken after the first prediction."""
+    module = load('catch.py')
+    rclpy.init()
+    catcher = module.Catcher(module.Robot(0.0, 0.0, 6.0, 5.0))
+    try:
+        catcher._on_landing(PoseWithCovarianceStamped())
+        down = []
+        for speed in (0.0, 12.0, 0.0):
+            message = Odometry()
+            message.twist.twist.linear.x = speed
+            catcher._on_odometry(message)
+            down.append(catcher.is_down)
+        assert down == [False, False, True]
+    finally:
+        catcher.destroy_node()
+        rclpy.try_shutdown()
 
 
 def test_catch_reports_that_there_is_no_predictor(load, capsys):
