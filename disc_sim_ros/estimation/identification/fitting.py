@@ -212,7 +212,12 @@ def fitted_alone(problem: Problem, k: int) -> Alone:
 
 
 def retry_releases(
-    problem: Problem, x: FloatArray, which: Sequence[int], *, thorough: bool = False
+    problem: Problem,
+    x: FloatArray,
+    which: Sequence[int],
+    *,
+    thorough: bool = False,
+    better: float = BETTER,
 ) -> tuple[Problem, FloatArray, bool]:
     """Fit releases again from many starts, with the shared parameters known better by now.
 
@@ -225,6 +230,7 @@ def retry_releases(
         which: Numbers of the throws.
         thorough: Whether to fit from one start of each attitude in place of the few starts that
             fit best as they are, which are often in one minimum, and to go on with the best.
+        better: Decrease of the cost of a throw for which its release is exchanged.
 
     Returns:
         The problem with changes counted from the best first states, the parameters there, and
@@ -241,7 +247,7 @@ def retry_releases(
                 else _fits_near(problem, k, here, kept[k])
             )
             least = min(fits, key=lambda fit: fit.cost)
-            if least.cost < cost_of_throw(problem, k, here) - BETTER:
+            if least.cost < cost_of_throw(problem, k, here) - better:
                 return least.problem.throws[0], least.here, True
         return problem.throws[k], here, False
 
@@ -250,7 +256,7 @@ def retry_releases(
     x = x.copy()
     for k, (_, here, _) in enumerate(results):
         x[problem.own(k)] = here[problem.shared :]
-    return problem, x, any(better for _, _, better in results)
+    return problem, x, any(exchanged for _, _, exchanged in results)
 
 
 @dataclass(frozen=True, eq=False)

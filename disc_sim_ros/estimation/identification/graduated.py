@@ -3,12 +3,15 @@
 Where only the turning is measured, a few directions of the parameters move the measurements by
 hundreds of standard deviations and others by one. Gauss-Newton steps with the whole weight follow
 the first and go anywhere in the others: discs that no catalogue has, thrown at -30 degrees to the
-air, whose errors cancel. Such places are local minima. If the noise is taken as a hundred times
+air, whose errors cancel. Such places are local minima. If the noise is taken as a thousand times
 too large, what is believed of a disc and of a throw holds these directions until the others fit;
 the weights then grow step by step, and each minimum is a start for the next.
+
+Which minimum a search ends in is decided while the noise is between a hundred and ten times too
+large. At ten times wrong minima already fit visibly worse, and are few: that is where searches
+are compared, and where releases are tried again.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,148 +20,109 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification.coefficients import NAMES
 from disc_sim_ros.estimation.identification.fitting import (
     BETTER,
-    Progress,
     promising,
     retry_releases,
     starts,
 )
-from disc_sim_ros.estimation.identification.normal_equations import (
-    Block,
-    costs_of_throw,
-    each,
-    linear_blocks,
-    reduced,
-)
+from disc_sim_ros.estimation.identification.joint import minimised
 from disc_sim_ros.estimation.identification.problem import FINE, ROUGH, Problem
 from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE
 from disc_sim_ros.quantities import COEFFICIENTS
 
-_FACTORS = (100.0, 30.0, 10.0, 5.0, 3.0, 2.0)  # on the noise, before the noise itself
-_TRUSTED = 3.0  # factor down to which beliefs may be drawn, and steps rough
+HALFWAY = 10.0  # factor on the noise at which searches are compared
+_FACTORS = (1000.0, 300.0, 100.0, 60.0, 30.0, 20.0, HALFWAY)
+_LAST_FACTORS = (7.0, 5.0, 4.0, 3.0, 2.0, 1.0)
+_TRUSTED = 30.0  # factor down to which beliefs may be drawn
 # How far drawn beliefs lie from those of the problem, in its standard deviations, and how many of
 # the parameters of a release keep theirs, because the gyro measures them.
 _COEFFICIENT_SPREAD, _RELEASE_SPREAD, _TURNING = 1.0, 0.5, 4
-_ENOUGH = 0.1  # decrease of the cost that ends the search with one factor, in half squares
-_ENOUGH_AT_LAST = 1e-2
-_STEPS, _LAST_STEPS = 15, 40
 _RETRIES = 3
+# Decrease of the cost for which a release is exchanged while the noise is that of HALFWAY: costs
+# are a hundredth of those at the end, and a wrong release may cost a few tenths.
+_BETTER_HALFWAY = 0.1
 _BEGINNING = 0.6  # s of each throw by which a release is chosen, before errors of a disc add up
-# On the diagonal of the normal equations, times what was best in the step before. All are flown
-# side by side, which takes about a third of the time of the derivatives.
-_DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)
-_FIRST_DAMPING, _MOST_DAMPING = 1e-3, 1e6
-_SINGULAR = 1e-13  # keeps an equation solvable whose parameters nothing tells apart
 
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The end of a graduated search.
+    """The end of a graduated search, or where it is halfway.
 
     Attributes:
         problem: With changes counted from the best first state of each throw.
         x: Its parameters, shape (p,).
         cost: Half the robust sum of squares.
+        factor: On the noise of the problem, with which `x` is best.
     """
 
     problem: Problem
     x: FloatArray
     cost: float
+    factor: float
 
 
-def search(
-    problem: Problem,
-    shared: FloatArray,
-    progress: Progress | None = None,
-    stage: str = '',
-    drawn: np.random.Generator | None = None,
-) -> End:
-    """Return what a graduated search finds from shared parameters and the best of many releases.
+def begun(problem: Problem, drawn: np.random.Generator | None = None) -> End:
+    """Return what a search finds while the noise is up to HALFWAY times too large.
 
-    The throws may still be in wrong minima of their releases: see `settled`.
+    All steps are FINE: rough ones can misread a gyro by more than its noise, and then favour a
+    wrong minimum.
 
     Args:
-        problem: The problem; while the noise is large, it is solved in rough steps, and then in
-            FINE ones: rough steps can misread a gyro by more than its noise, and then favour a
-            wrong minimum.
-        shared: First shared parameters, shape (shared,).
-        progress: Called with the stage, a count and the cost.
-        stage: For `progress`.
-        drawn: Draws other beliefs, which the search heeds while the noise is large; None for
-            those of the problem. From other shared parameters it comes to the same end.
+        problem: The problem.
+        drawn: Draws other beliefs, which the search heeds while the noise is very large; None for
+            those of the problem.
+
+    Returns:
+        The end. Its throws may still be in wrong minima of their releases.
     """
-    first = problem.means.copy()
-    first[: problem.shared] = np.clip(shared, *problem.bounds)
+    around = _with_first_releases(problem)
+    other = around if drawn is None else _with_other_beliefs(around, drawn)
+    x, cost = around.means.copy(), np.inf
+    for factor in _FACTORS:
+        x, cost = minimised(_with_noise(other if factor > _TRUSTED else around, factor), x)
+    return End(around, x, cost, HALFWAY)
+
+
+def finished(halfway: End) -> End:
+    """Return the end of a search that has begun, with the noise of the problem.
+
+    Releases are tried again first: see `settled`.
+    """
+    end = settled(halfway)
+    for factor in _LAST_FACTORS:
+        x, cost = minimised(_with_noise(end.problem, factor), end.x)
+        end = End(end.problem, x, cost, factor)
+    return end
+
+
+def settled(end: End) -> End:
+    """Return an end of which no throw fits better with a release from another attitude.
+
+    A throw in a wrong minimum bends the coefficients, and those keep it there.
+    """
+    every = range(len(end.problem.throws))
+    enough = BETTER if end.factor == 1.0 else _BETTER_HALFWAY
+    for _ in range(_RETRIES):
+        noisy = _with_noise(end.problem, end.factor)
+        noisy, x, better = retry_releases(noisy, end.x, every, thorough=True, better=enough)
+        if not better:
+            break
+        x, cost = minimised(noisy, x)
+        if cost > end.cost - enough:
+            break
+        end = End(replace(end.problem, throws=noisy.throws), x, cost, end.factor)
+    return end
+
+
+def _with_first_releases(problem: Problem) -> Problem:
+    """Return the problem with changes counted from the start of each throw that fits best."""
+    first = problem.means
     beginnings = tuple(throw.until(_BEGINNING) for throw in problem.throws)
     early = replace(problem, throws=beginnings, margin=ROUGH)
     throws = []
     for k, throw in enumerate(problem.throws):
         (state,) = promising(early, k, problem.here(k, first), starts(throw), 1)
         throws.append(throw.starting_at(state))
-    around = replace(problem, throws=tuple(throws), margin=FINE)
-    first[problem.shared :] = 0.0
-    rough = replace(around, margin=ROUGH)
-    if drawn is not None:
-        rough = _with_other_beliefs(rough, drawn)
-    x, cost = first, np.inf
-    for count, factor in enumerate((*_FACTORS, 1.0)):
-        last = factor == 1.0
-        x, cost = _joint(
-            _with_noise(rough if factor > _TRUSTED else around, factor),
-            x,
-            _LAST_STEPS if last else _STEPS,
-            _ENOUGH_AT_LAST if last else _ENOUGH,
-        )
-        if progress is not None:
-            progress(stage, count + 1, cost)
-    return End(around, x, cost)
-
-
-def settled(end: End) -> End:
-    """Return an end of which no throw fits better with a release from another attitude."""
-    for _ in range(_RETRIES):
-        again = _with_other_releases(end, range(len(end.problem.throws)))
-        if again is None or again.cost > end.cost - BETTER:
-            break
-        end = again
-    return end
-
-
-def search_without(
-    problem: Problem,
-    shared: FloatArray,
-    k: int,
-    progress: Progress | None = None,
-    stage: str = '',
-) -> End:
-    """Return what a graduated search finds that meets throw `k` only at its end.
-
-    A throw whose release is in a wrong minimum bends the coefficients, and those keep it there.
-
-    Args:
-        problem: The problem.
-        shared: First shared parameters, shape (shared,).
-        k: Number of the throw.
-        progress: Called with the stage, a count and the cost.
-        stage: For `progress`.
-    """
-    others = [i for i in range(len(problem.throws)) if i != k]
-    rest = replace(problem, throws=tuple(problem.throws[i] for i in others))
-    result = search(rest, shared, progress, stage)
-    throws = list(result.problem.throws)
-    throws.insert(k, problem.throws[k])
-    x = np.insert(
-        result.x, np.full(RELEASE_SIZE, problem.own(k).start), problem.throws[k].believed
-    )
-    whole = End(replace(problem, throws=tuple(throws), margin=FINE), x, np.inf)
-    return _with_other_releases(whole, (k,)) or whole
-
-
-def _with_other_releases(end: End, which: Sequence[int]) -> End | None:
-    """Return what is found with releases from all attitudes; None if none of them is better."""
-    around, x, better = retry_releases(end.problem, end.x, which, thorough=True)
-    if not better:
-        return None
-    return End(around, *_joint(around, x, _LAST_STEPS, _ENOUGH_AT_LAST))
+    return replace(problem, throws=tuple(throws), margin=FINE)
 
 
 def _with_other_beliefs(problem: Problem, generator: np.random.Generator) -> Problem:
@@ -178,49 +142,3 @@ def _with_other_beliefs(problem: Problem, generator: np.random.Generator) -> Pro
 
 def _with_noise(problem: Problem, factor: float) -> Problem:
     return replace(problem, noise={kind: factor * n for kind, n in problem.noise.items()})
-
-
-def _joint(
-    problem: Problem, x: FloatArray, most_steps: int, enough: float
-) -> tuple[FloatArray, float]:
-    """Minimise over all parameters at once, and return them with the cost.
-
-    Levenberg-Marquardt steps. `fitting.solve` fits all releases anew for each set of shared
-    parameters: that takes five times as long for a step, and pays where the valley is narrow.
-    """
-    cost = float(_costs(problem, x[np.newaxis])[0])
-    damping = _FIRST_DAMPING
-    for _ in range(most_steps):
-        blocks = linear_blocks(problem, x)
-        gain = 0.0
-        while gain <= 0.0 and damping < _MOST_DAMPING:
-            tried = np.stack([_moved(problem, x, blocks, d * damping) for d in _DAMPINGS])
-            costs = _costs(problem, tried)
-            i = int(np.argmin(costs))
-            gain = cost - float(costs[i])
-            damping *= float(_DAMPINGS[i]) if gain > 0.0 else float(_DAMPINGS[-1])
-        if gain <= 0.0:
-            break
-        x, cost = tried[i], float(costs[i])
-        if gain < enough:
-            break
-    return x, cost
-
-
-def _moved(problem: Problem, x: FloatArray, blocks: list[Block], damping: float) -> FloatArray:
-    """Return the parameters after one damped step."""
-    equations = reduced(problem, x, blocks, damping)
-    return equations.moved(equations.step(_SINGULAR))
-
-
-def _costs(problem: Problem, several: FloatArray) -> FloatArray:
-    """Return half the robust sums of squares of sets of parameters, shape (m,), from (m, p)."""
-    n = problem.shared
-
-    def of_throw(k: int) -> FloatArray:
-        own = several[:, problem.own(k)]
-        return costs_of_throw(problem, k, np.concatenate([several[:, :n], own], axis=1))
-
-    priors = (several[:, :n] - problem.means[:n]) / problem.shared_deviations
-    costs: FloatArray = 0.5 * (priors**2).sum(axis=1) + sum(each(problem, of_throw))
-    return costs

@@ -7,7 +7,7 @@ import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification.fitting import BETTER, Progress, solve
-from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
+from disc_sim_ros.estimation.identification.joint import cost_of, minimised
 from disc_sim_ros.estimation.identification.problem import Problem
 
 STAGE = 'errors'
@@ -16,7 +16,7 @@ STAGE = 'errors'
 _ROBUST = 0.895
 _FAR = 3.0  # standard errors of a parabola at which the sum of squares is looked at
 _PARABOLA = 0.15  # relative departure of the rise up to which it counts as a parabola
-_STEPS = 3  # of the fit of all other parameters
+_STEPS, _JOINT_STEPS = 3, 15  # of the fit of all other parameters
 _WIDEST = 10.0
 
 
@@ -55,7 +55,7 @@ def profiled(
     problem = replace(problem, margin=problem.roughest)
     low, high = problem.bounds
     x = solve(problem, x, most_steps=2).x
-    lowest = _cost(problem, x)
+    lowest = cost_of(problem, x)
     factors = np.ones(len(problem.free))
     for i in range(len(problem.free)):
         if progress is not None:
@@ -67,10 +67,10 @@ def profiled(
                 continue  # a bound is near: it limits the coefficient more than the throws do
             moved = x + covariance[:, i] / covariance[i, i] * distance * error
             moved[: problem.shared] = np.clip(moved[: problem.shared], low, high)
-            cost = _cost(problem, moved)
+            cost = cost_of(problem, moved)
             if abs(2.0 * (cost - lowest) / _ROBUST / distance**2 - 1.0) > _PARABOLA:
                 moved = _fitted_beside(problem, moved, i)
-                cost = _cost(problem, moved)
+                cost = cost_of(problem, moved)
                 if cost < lowest - BETTER:
                     return Profile(factors, moved)
             rise = 2.0 * (cost - lowest) / _ROBUST
@@ -79,17 +79,16 @@ def profiled(
     return Profile(factors)
 
 
-def _cost(problem: Problem, x: FloatArray) -> float:
-    """Return half the robust sum of squares."""
-    throws = (cost_of_throw(problem, k, problem.here(k, x)) for k in range(len(problem.throws)))
-    prior = problem.shared_priors(x[: problem.shared])
-    return float(sum(throws) + 0.5 * (prior**2).sum())
-
-
 def _fitted_beside(problem: Problem, x: FloatArray, i: int) -> FloatArray:
     """Return the parameters with coefficient `i` held and the others fitted."""
     held = problem.held.copy()
     held[problem.free[i]] = x[i]
     rest = replace(problem, free=tuple(np.delete(problem.free, i)), held=held)
-    fitted = solve(rest, np.delete(x, i), most_steps=_STEPS)
-    return np.insert(fitted.x, i, x[i])
+    others = np.delete(x, i)
+    # A gyro holds each release: steps over all parameters then come as far in a quarter of the
+    # time. Positions leave valleys, along which only releases that are fitted anew follow.
+    if problem.turns_only:
+        fitted, _ = minimised(rest, others, _JOINT_STEPS)
+    else:
+        fitted = solve(rest, others, most_steps=_STEPS).x
+    return np.insert(fitted, i, x[i])

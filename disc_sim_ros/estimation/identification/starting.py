@@ -24,7 +24,9 @@ from disc_sim_ros.threads import Threads
 
 _SPREAD = 0.5  # of the prior: how far other starts lie
 _STEPS = 12
-DRAWN = 12  # graduated searches with drawn beliefs, while residuals are not white
+# While residuals are not white, so many rounds of graduated searches with drawn beliefs follow, of
+# each of which one is finished.
+ROUNDS, DRAWN = 4, 3
 _NEAR = 60.0  # half squares above the best end: what two releases in wrong minima may cost
 _RELEASES = 'releases'
 
@@ -117,26 +119,23 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
 
     In a wrong minimum residuals are usually correlated. Then more searches follow.
     """
-    n = len(problem.free)
-    ends: list[graduated.End] = []
-    for free in search.coefficients(problem, problem.means[:n]):
-        shared = problem.means[: problem.shared].copy()
-        shared[:n] = free
-        ends.append(graduated.search(problem, shared, search.progress, _RELEASES))
-    throws = len(problem.throws)
-    shared = problem.means[: problem.shared]
-    ends += (
-        graduated.search_without(problem, shared, k, search.progress, _RELEASES)
-        for k in range(throws if throws > 1 else 0)
-    )
-    end = graduated.settled(min(ends, key=lambda e: e.cost))
     generator = np.random.default_rng(search.seed)
-    for _ in range(DRAWN):
+
+    def best(drawn: Sequence[np.random.Generator | None]) -> graduated.End:
+        begun = []
+        for number, source in enumerate(drawn):
+            begun.append(graduated.begun(problem, source))
+            if search.progress is not None:
+                search.progress(_RELEASES, number + 1, begun[-1].cost)
+        return graduated.finished(min(begun, key=lambda each: each.cost))
+
+    end = graduated.settled(best([None] + [generator] * (search.starts - 1)))
+    for _ in range(ROUNDS):
         if information.correlation(end.problem, end.x).is_chance:
             break
-        other = graduated.search(problem, shared, search.progress, _RELEASES, generator)
+        other = best([generator] * DRAWN)
         if other.cost < end.cost + _NEAR:
-            end = min(end, graduated.settled(other), key=lambda e: e.cost)
+            end = min(end, graduated.settled(other), key=lambda each: each.cost)
     return end.problem, end.x
 
 
