@@ -7,8 +7,8 @@ Each cell is a set of seeded throws, drawn from the prior that the predictor is 
 exact model, and measured, 60 times a second if its name says nothing else, with noise: positions
 to 2 cm and, where the cell has attitude, the disc's axis to 2 degrees. The bound is that of the
 exact model with the same prior, linear at the true throw. The own bound is that of the model that
-the predictor flies, which has no nutation: the exact one learns the spin from it. `in` is the
-share of the landings inside the predictor's 90 % ellipse.
+the predictor flies, if throws were so: it has no nutation, from which the exact one learns the
+spin. `in` is the share of the landings inside the predictor's 90 % ellipse.
 A throw counts at a time of watching while it is in the air. Every measurement is an update, as in
 `predictor_node`; those at a time of watching and the first of a throw are with the ellipse.
 """
@@ -237,10 +237,15 @@ def measured(t: Throw, attitude: bool, k: int) -> Measurements:  # noqa: FBT001
 
 
 def bound(model: Model, t: Throw, data: Measurements, seed: int) -> float:
-    """Return the miss of one draw from the bound at the true throw [m]."""
+    """Return the miss of one draw from the bound at the true throw [m].
+
+    What is measured is what the model flies: else its own errors would be taken for larger noise.
+    """
     true = Estimate(t.state, np.array([t.row[AT[name]] for name in model.prior.constants]))
     small = np.diag(np.full(model.unknowns - POSITION, 1e-3))
-    exact = replace(data, position=paper_from_map(t.exact[: len(data.time)]))
+    flown = model.tracker.fly(t.state[None], t.row[None], data.time, 0.0).sights[0, :, :, 0]
+    axis = np.where(np.isfinite(data.axis), flown[:, POSITION:], np.nan)
+    exact = replace(data, position=flown[:, :POSITION], axis=axis)
     linear, _, _ = linearised(model, true, small, exact, to_landing=True)
     covariance = (linear.landing @ linear.covariance @ linear.landing.T)[:2, :2]
     rng = np.random.default_rng([seed, 2])
