@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from disc_sim_ros.errors import ConfigError
+from disc_sim_ros.estimation.prediction import throw_detection
 from disc_sim_ros.estimation.prediction.predictor import (
     Measurement,
     Prediction,
@@ -12,6 +13,7 @@ from disc_sim_ros.estimation.prediction.predictor import (
     PredictorConfig,
 )
 from disc_sim_ros.estimation.prediction.prior import ThrowPrior, disc_offsets
+from disc_sim_ros.estimation.prediction.replay import replay
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import map_from_paper
@@ -240,6 +242,37 @@ def test_catch_ends_a_throw(throws):
     assert not predictor.is_following
 
 
+def test_a_wrong_minimum_is_no_end_of_a_throw():
+    """The fit of this throw was caught after 3 s: it ended there, and another one began."""
+    prior = ThrowPrior(offsets=disc_offsets(load_disc('ultrastar')))
+    t = throw(SETUP, prior, 108, least=0.9)
+    predictor, prediction = Predictor(PredictorConfig(setup=SETUP, prior=prior)), None
+    for k, m in enumerate(t.measurements()):
+        predictor.add(m)
+        if k < 24 or k % 3 == 0:
+            prediction = predictor.update(ellipse=False) or prediction
+    assert predictor.throws == 1
+    assert miss(prediction, t) < 0.2
+
+
+@pytest.mark.parametrize(('measured', 'ended'), [(9.0, False), (2.0, True)])
+def test_a_disc_that_goes_on_is_not_stopped(measured: float, *, ended: bool):
+    """Six measurements that the model does not follow, as of a slow spin that wobbles."""
+    squares = np.array([1.0] * 100 + [30.0] * 6)
+    assert throw_detection.has_ended(1.0, 3.0, squares, (measured, 10.0)) is ended
+
+
+def test_recorded_measurements_of_a_fast_tracker_share_updates(throws):
+    """A file at 20 kHz did not end in minutes: each of its rows was an update."""
+    fast = throw(SETUP, PRIOR, 3, rate=2000.0)
+    (followed,) = replay({'fast': fast.measurements()}, CONFIG)
+    gaps = np.diff([p.time for p in followed.predictions])
+    assert gaps[:-1].min() > 0.9 / 240.0
+    assert followed.predictions[-1].time == fast.time[-1]
+    (slow,) = replay({'slow': throws[3].measurements()}, CONFIG)
+    assert len(slow.predictions) > len(throws[3].time) - 8
+
+
 @pytest.mark.parametrize('later', [20.0, 1.79e9])
 def test_a_clock_that_is_set_forward_ends_a_throw(throws, later):
     """Each second of the gap was flown: `predictor_node` computed for ever, past Ctrl-C."""
@@ -312,6 +345,8 @@ def test_memory_of_a_throw_is_bounded(throws):
         if k % 100 == 99:
             prediction = predictor.update(ellipse=False) or prediction
     assert miss(prediction, t) < 0.5
+    gaps = np.diff(predictor._rows[:, 0])  # what is left tells of the whole flight alike
+    assert gaps.max() < 4.0 * t.time[-1] / MOST_MEASUREMENTS
 
 
 @pytest.mark.parametrize(

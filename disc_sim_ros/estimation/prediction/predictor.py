@@ -28,9 +28,11 @@ from disc_sim_ros.physics.kernels.tracking import track_simd
 from disc_sim_ros.physics.sampled import fly_sampled
 from disc_sim_ros.quantities import POSITION, PREDICTION
 
-MOST_MEASUREMENTS = 600  # of one throw; of more, every second of the older half is left out
+MOST_MEASUREMENTS = 600  # of one throw; of more, the one with the nearest neighbours is left out
 STEP = 0.02  # s; without nutation within 26 mm, 0.2 mm in the median (docs/predictor.md)
-MORE = 4  # Gauss-Newton steps before a throw is taken to have ended
+# Before a throw is taken to have ended: Gauss-Newton steps, and the shortest time after which it
+# is fitted from the beginning again [s].
+MORE, _ANEW_PERIOD = 4, 0.2
 _MOST_WAITING = 3  # updates in a row without the opposite spin
 _ORDER = 1e-9  # s between two measurements
 _BACK = 1.0  # s by which time is set back, not a late measurement
@@ -174,6 +176,7 @@ class Predictor:
         self._estimator: DiscChoice | None = None
         self._rows = _NO_ROWS  # time, position, sigma, axis; ascending
         self._new = False
+        self._anew = -math.inf  # s since the first measurement, when it was last fitted anew
         self._waiting = 0  # updates with an ellipse since the opposite spin was tried
         self.throws = 0
         self.late = 0
@@ -207,6 +210,7 @@ class Predictor:
     def reset(self) -> None:
         """Forget the throw and its measurements."""
         self._estimator, self._rows, self._new = None, _NO_ROWS, False
+        self._anew = -math.inf
 
     def add(self, m: Measurement) -> bool:
         """Take a measurement, in any order; return False if it came too late or twice."""
@@ -225,8 +229,8 @@ class Predictor:
         if self._estimator is None:
             rows = rows[throw_detection.first_of_window(rows[:, 0]) :]
         elif len(rows) > MOST_MEASUREMENTS:
-            half = len(rows) // 2
-            rows = np.concatenate([rows[:half:2], rows[half:]])
+            between = rows[2:, 0] - rows[:-2, 0]
+            rows = np.delete(rows, 1 + int(np.argmin(between)), axis=0)
         self._rows = rows
         return True
 
@@ -267,13 +271,33 @@ class Predictor:
             self._estimator, self._rows = self._choice(), self._rows[early:]
             data = self._measurements()
             fitted = self._estimator.update(data)
-        if _has_ended(fitted, data) and _has_ended(self._estimator.update(data, MORE), data):
+        if _has_ended(fitted, data) or _is_lost(fitted):
+            self._estimator, fitted = self._fitted_again(self._estimator, data)
+        if _has_ended(fitted, data):
             self.reset()
             return None
         if not np.isfinite(fitted.landing).all():
             return None
         start = float(self._rows[0, 0])
         return self._prediction(self._estimator, data, start, ellipse=ellipse)
+
+    def _fitted_again(
+        self, estimator: DiscChoice, data: Measurements
+    ) -> tuple[DiscChoice, Fitted]:
+        """Return an estimator after more steps, or one that has begun anew, and its fit.
+
+        A fit in a wrong minimum looks like the end of a throw.
+        """
+        fitted = estimator.update(data, MORE)
+        doubtful = _has_ended(fitted, data) or _is_lost(fitted)
+        if not doubtful or data.time[-1] < self._anew + _ANEW_PERIOD:
+            return estimator, fitted
+        self._anew = float(data.time[-1])
+        anew = self._choice()
+        other = anew.update(data, MORE)
+        if _has_ended(other, data) or _is_lost(other):
+            return estimator, fitted
+        return anew, other
 
     def _choice(self) -> DiscChoice:
         return DiscChoice(self._models, self._opposite, self._config.opposite_spin)
@@ -364,8 +388,14 @@ def _wind(model: Model, estimate: Estimate, linear: Linear) -> tuple[FloatArray,
 
 
 def _has_ended(fitted: Fitted, data: Measurements) -> bool:
+    measured = throw_detection.newest_speed(data.time, data.position)
+    speeds = measured, float(np.linalg.norm(fitted.last[3:6]))
     now, landing = float(data.time[-1]), float(fitted.landing[2])
-    return throw_detection.has_ended(now, landing, fitted.squares[:, 0], data.position)
+    return throw_detection.has_ended(now, landing, fitted.squares[:, 0], speeds)
+
+
+def _is_lost(fitted: Fitted) -> bool:
+    return throw_detection.is_lost(fitted.squares[:, 0])
 
 
 _FULL = 20.0  # squared residual at which a weight is one half

@@ -20,6 +20,9 @@ from disc_sim_ros.physics.trajectory import COLUMNS, Trajectory
 from disc_sim_ros.quantities import POSITION
 
 ELLIPSE_PERIOD = 0.05  # s of measurements between two ellipses
+# The same between two updates at least: about the time that one takes. A measurement may come a
+# tenth of it early.
+UPDATE_PERIOD, _EARLY = 1.0 / 240.0, 0.1
 _SHORTEST_QUATERNION = 1e-6
 
 
@@ -79,6 +82,9 @@ def replay(
 ) -> list[FollowedThrow]:
     """Return the predictions of every throw in recordings, each with a clock of its own.
 
+    As in `predictor_node`, which takes all that has arrived and predicts once, measurements that
+    come faster than 240 times a second share an update.
+
     Args:
         recordings: Measurements in their order, by the name of the recording.
         config: What is known beforehand.
@@ -104,16 +110,20 @@ def _replayed(
     predictor = Predictor(config)
     throws: dict[int, list[Prediction]] = {}
     every: list[Measurement] = []
-    last, covariance = -np.inf, np.full((3, 3), np.nan)
-    for m in measurements:
+    updated, last, covariance = -np.inf, -np.inf, np.full((3, 3), np.nan)
+    shortest = (1.0 - _EARLY) * UPDATE_PERIOD
+    for m, following in itertools.pairwise(itertools.chain(measurements, [None])):
+        assert m is not None  # noqa: S101 - for the type checker
         every.append(m)
         predictor.add(m)
-        prediction = predictor.update(ellipse=not last <= m.time < last + ELLIPSE_PERIOD)
-        if prediction is not None:
-            if np.isfinite(prediction.covariance).all():
-                last, covariance = m.time, prediction.covariance
-            prediction = replace(prediction, covariance=covariance)
-            throws.setdefault(prediction.throw, []).append(prediction)
+        if following is None or not updated <= m.time < updated + shortest:
+            updated = m.time
+            prediction = predictor.update(ellipse=not last <= m.time < last + ELLIPSE_PERIOD)
+            if prediction is not None:
+                if np.isfinite(prediction.covariance).all():
+                    last, covariance = m.time, prediction.covariance
+                prediction = replace(prediction, covariance=covariance)
+                throws.setdefault(prediction.throw, []).append(prediction)
         taken()
     return [
         (tuple(of), tuple(m for m in every if of[0].reference_time <= m.time <= of[-1].time))

@@ -23,7 +23,7 @@ YOUNG = 0.4  # s, in which measurements of the hand are taken out of a throw
 AFTER_LANDING = 0.08  # s after the predicted landing until the throw has ended
 ENDED_BY = 6  # measurements one after the other that the flight cannot explain
 _FAR = 25.0  # their squared residual
-_ONE_STOP = 0.3  # share of the distances that outliers keep from each other: they are one object
+_SLOW = 0.5  # share of the speed of the flight, below which the disc was stopped
 
 
 def first_of_window(time: FloatArray) -> int:
@@ -91,20 +91,45 @@ def of_the_hand(time: FloatArray, squares: FloatArray) -> int:
     return count if len(time) - count >= LEAST else 0
 
 
-def has_ended(now: float, landing_time: float, squares: FloatArray, position: FloatArray) -> bool:
-    """Return True if a throw is over: it landed, or the newest measurements cannot be of it.
+def is_lost(squares: FloatArray) -> bool:
+    """Return True if the flight cannot explain the newest measurements.
+
+    It is another object, or no flight any more, or the fit is in a wrong minimum.
+
+    Args:
+        squares: Squared residuals of all positions, shape (k,).
+    """
+    enough = len(squares) >= ENDED_BY + LEAST
+    return enough and bool((squares[-ENDED_BY:] > _FAR).all())
+
+
+def has_ended(
+    now: float, landing_time: float, squares: FloatArray, speeds: tuple[float, float]
+) -> bool:
+    """Return True if a throw is over: it landed, or something stopped the disc.
 
     Args:
         now: Time of the newest measurement since the reference [s].
         landing_time: Predicted [s]; nan without a landing.
         squares: Squared residuals of all positions, shape (k,).
-        position: The measurements, shape (k, 3).
+        speeds: Of the newest measurements, see `newest_speed`, and of the flight now [m/s].
     """
     if now > landing_time + AFTER_LANDING:
         return True
-    if len(squares) < ENDED_BY + LEAST:
-        return False
-    if not (squares[-ENDED_BY:] > _FAR).all():
-        return False
-    steps = np.linalg.norm(np.diff(position[-ENDED_BY:], axis=0), axis=1)
-    return float(np.median(steps)) < _ONE_STOP
+    measured, flown = speeds
+    return is_lost(squares) and measured < _SLOW * flown
+
+
+def newest_speed(time: FloatArray, position: FloatArray) -> float:
+    """Return the speed from the first to the last of the newest measurements [m/s]; of few, inf.
+
+    Outliers are far from each other, which makes it high.
+
+    Args:
+        time: Times [s], ascending, shape (k,).
+        position: The measurements [m], shape (k, 3).
+    """
+    if len(time) < ENDED_BY:
+        return float('inf')
+    way = float(np.linalg.norm(position[-1] - position[-ENDED_BY]))
+    return way / float(time[-1] - time[-ENDED_BY])
