@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+import itertools
 
 import numpy as np
 
@@ -120,13 +121,14 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
     In a wrong minimum residuals are usually correlated. Then more searches follow.
     """
     generator = np.random.default_rng(search.seed)
+    done = itertools.count(1)
 
     def best(drawn: Sequence[np.random.Generator | None]) -> graduated.End:
         begun = []
-        for number, source in enumerate(drawn):
+        for source in drawn:
             begun.append(graduated.begun(problem, source))
             if search.progress is not None:
-                search.progress(_RELEASES, number + 1, begun[-1].cost)
+                search.progress(_RELEASES, next(done), begun[-1].cost)
         return graduated.finished(min(begun, key=lambda each: each.cost))
 
     end = graduated.settled(best([None] + [generator] * (search.starts - 1)))
