@@ -1,8 +1,9 @@
 """`identify`: the coefficients of a disc, with standard errors, from measured throws."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+import itertools
 import json
 from pathlib import Path
 import shlex
@@ -182,7 +183,7 @@ def _run(chosen: argparse.Namespace, words: Sequence[str]) -> int:
     if note := sampled.first_call_note():
         output.note(chosen.prog, note)
     n = len(throws)
-    stages = (*identify.stages(n, chosen.starts), *crossvalidation.stages(n))
+    stages = identify.stages(throws, chosen.starts) | crossvalidation.stages(n)
     progress = _Progress(chosen.prog, stages)
     result = identify.identify(
         throws,
@@ -247,7 +248,7 @@ def _write_outputs(
 class _Progress:
     """Shows stage, cost and a guess of the time left on stderr, at most every two seconds."""
 
-    def __init__(self, prog: str, stages: Sequence[str]) -> None:
+    def __init__(self, prog: str, stages: Mapping[str, float]) -> None:
         self._prog, self._last, self._stages = prog, time.monotonic(), stages
         self._started = self._last
 
@@ -258,9 +259,11 @@ class _Progress:
             self._last = now
             tail = f', half squares {cost:.1f}' if cost == cost else ''  # noqa: PLR0124 - not nan
             spent = now - self._started
-            done = self._stages.index(stage) if stage in self._stages else 0
-            if done:  # as if every stage took as long
-                tail += f'; about {spent / done * (len(self._stages) - done):.0f} s left'
+            before = itertools.takewhile(lambda name: name != stage, self._stages)
+            done = sum(self._stages[name] for name in before)
+            left = sum(self._stages.values()) - done
+            if done > 0.0 and stage in self._stages:  # as if each takes its usual share
+                tail += f'; about {spent / done * left:.0f} s left'
             output.note(self._prog, f'{spent:.0f} s: {stage}, step {count}{tail}')
 
 
