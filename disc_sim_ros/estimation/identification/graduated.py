@@ -61,7 +61,7 @@ class End:
 
 
 def begun(problem: Problem, drawn: np.random.Generator | None = None) -> End:
-    """Return what a search finds while the noise is up to HALFWAY times too large.
+    """Return what a search finds while the noise comes down to HALFWAY times its value.
 
     All steps are FINE: rough ones can misread a gyro by more than its noise, and then favour a
     wrong minimum.
