@@ -10,7 +10,7 @@ from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import report
 from disc_sim_ros.estimation.identification.fitting import fit_release, retry_releases, solve
 from disc_sim_ros.estimation.identification.graduated import HALFWAY, begun, finished, settled
-from disc_sim_ros.estimation.identification.identify import Identification
+from disc_sim_ros.estimation.identification.identify import Identification, identify
 from disc_sim_ros.estimation.identification.information import (
     CHI_SQUARED,
     LAGS,
@@ -78,6 +78,25 @@ def test_drawn_beliefs_find_what_those_of_the_problem_do_not():
     end = finished(halfway)
     assert end.cost < solve(around, true).cost + NEAR
     assert correlation(end.problem, end.x).is_chance
+
+
+def test_ctrl_c_keeps_what_was_found_before_further_searches():
+    """Residuals that are correlated make it search on, for minutes where the model lacks much."""
+    _, _, ((throw, _),) = drawn(309, BASE, (GYRO,), count=1)
+    (gyro,) = throw.observations
+    swing = 0.5 * np.sin(9.0 * gyro.t)[:, np.newaxis]
+    bent = replace(throw, observations=(replace(gyro, pqr=gyro.pqr + swing),))
+    counts = []
+
+    def interrupt(stage: str, count: int, _cost: float) -> None:
+        counts.append((stage, count))
+        if count == 2:
+            raise KeyboardInterrupt
+
+    result = identify([bent], BASE, starts=1, progress=interrupt)
+    assert result.interrupted
+    assert [count for _, count in counts] == [1, 2]
+    assert 0.1 < result.problem.noise[GYRO] < 0.6  # what is left, not the usual 0.02 rad/s
 
 
 def test_ends_are_compared_in_steps_that_follow_the_flight():

@@ -194,14 +194,14 @@ def identify(
         held=base.values,
     )
     best = Best()
+    given = set(noise or {})
     interrupted = False
     left_out: list[Unidentifiable] = []
     try:
         search = starting.Search(starts, seed, progress)
-        problem, x = starting.started(problem, search)
-        best = Best(x)
+        for better, first in starting.started(problem, search):
+            problem, x, best = better, first, Best(first)
         x = starting.from_starts(problem, x, search, best).x
-        given = set(noise or {})
         refuse_misfit(problem, estimated_noise(problem, x, given), given, HOPELESS)
         problem = replace(problem, margin=FINE)
         problem, x, left_out = _identifiable(problem, x, refuse=free is not None, anyway=anyway)
@@ -227,6 +227,8 @@ def identify(
         if not best.x.size or best.x.size != problem.size:
             raise
         interrupted = True
+        estimated = estimated_noise(problem, best.x, given)
+        problem = replace(problem, noise={**problem.noise, **estimated})
         result = errors.by_curvature(problem, best.x)
     return Identification(
         problem,

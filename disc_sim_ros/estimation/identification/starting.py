@@ -1,6 +1,6 @@
 """Where an identification begins: the best of several starts, with their releases."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -74,16 +74,20 @@ def _stage(number: int, starts: int) -> str:
     return f'start {number + 1} of {starts}'
 
 
-def started(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
-    """Return the problem around the best start of each throw, and first parameters.
+def started(problem: Problem, search: Search) -> Iterator[tuple[Problem, FloatArray]]:
+    """Yield the problem around the best start of each throw, and first parameters.
 
-    Its steps are as fine as those of the search.
+    Each pair is better than the one before, so that Ctrl-C loses only what was not better. Its
+    steps are as fine as those of the search.
     """
-    return (_graduated if problem.turns_only else fitted_apart)(problem, search)
+    if problem.turns_only:
+        yield from ((end.problem, end.x) for end in _graduated(problem, search))
+    else:
+        yield fitted_apart(problem, search)
 
 
 def fitted_apart(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
-    """Return the same of throws that are fitted one by one first."""
+    """Return the best start of throws that are fitted one by one first, as `started` yields it."""
     done = 0
 
     def start(k: int) -> Alone:
@@ -125,8 +129,8 @@ def _agreeing(
     return around, best.x
 
 
-def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
-    """Return the best end of graduated searches, see `graduated`.
+def _graduated(problem: Problem, search: Search) -> Iterator[graduated.End]:
+    """Yield the best end of graduated searches so far, see `graduated`.
 
     In a wrong minimum residuals are usually correlated. Then more searches follow.
     """
@@ -142,13 +146,16 @@ def _graduated(problem: Problem, search: Search) -> tuple[Problem, FloatArray]:
         return graduated.finished(min(begun, key=lambda each: each.cost))
 
     end = graduated.settled(best([None] + [generator] * (search.starts - 1)))
+    yield end
     for _ in range(ROUNDS):
         if information.correlation(end.problem, end.x).is_chance:
             break
         other = best([generator] * DRAWN)
         if other.cost < end.cost + _NEAR:
-            end = min(end, graduated.settled(other), key=lambda each: each.cost)
-    return end.problem, end.x
+            other = graduated.settled(other)
+        if other.cost < end.cost:
+            end = other
+            yield end
 
 
 def from_starts(problem: Problem, x: FloatArray, search: Search, best: Best) -> Solution:
