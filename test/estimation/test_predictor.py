@@ -225,21 +225,26 @@ def test_throw_is_recognised_from_six_measurements_of_a_slow_tracker(rate):
     assert miss([p for p in predictions if p is not None][-1], flown) < 0.2
 
 
-def test_catch_ends_a_throw(throws):
-    t = throws[0]
+@pytest.mark.parametrize('rate', [60.0, 6000.0])
+def test_catch_ends_a_throw(rate):
+    t, rng = throw(SETUP, PRIOR, 0, rate=rate), np.random.default_rng(0)
     predictor = Predictor(CONFIG)
-    for m in t.measurements():
-        if m.time > 1.0:
-            break
+    caught = round(1.0 * rate)
+    for k, m in enumerate(t.measurements()[:caught]):
         predictor.add(m)
-        predictor.update(ellipse=False)
+        if k % round(rate / 60.0) == 0:
+            predictor.update(ellipse=False)
     assert predictor.is_following
-    for k in range(1, 20):
-        predictor.add(Measurement(1.0 + k / 60.0, tuple(t.position[60])))
-        predictor.update(ellipse=False)
+    for k in range(1, round(0.3 * rate)):
+        held = t.exact[caught] + rng.normal(0.0, 0.02, 3)
+        predictor.add(Measurement(1.0 + k / rate, tuple(held)))
+        if k % round(rate / 60.0) == 0:
+            predictor.update(ellipse=False)
         if not predictor.is_following:
             break
     assert not predictor.is_following
+    assert k / rate < 0.2
+    assert predictor.throws == 1
 
 
 def test_a_wrong_minimum_is_no_end_of_a_throw():

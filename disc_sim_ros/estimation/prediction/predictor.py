@@ -273,9 +273,9 @@ class Predictor:
             fitted = self._estimator.update(data)
         if _has_ended(fitted, data) or _is_lost(fitted):
             self._estimator, fitted = self._fitted_again(self._estimator, data)
-        if _has_ended(fitted, data):
-            self.reset()
-            return None
+            if _has_ended(fitted, data):
+                self.reset()
+                return None
         if not np.isfinite(fitted.landing).all():
             return None
         start = float(self._rows[0, 0])

@@ -123,13 +123,15 @@ def has_ended(
 def newest_speed(time: FloatArray, position: FloatArray) -> float:
     """Return the speed from the first to the last of the newest measurements [m/s]; of few, inf.
 
+    They are ENDED_BY, and those of SHORTEST at least: of a fast tracker fewer tell only its noise.
     Outliers are far from each other, which makes it high.
 
     Args:
         time: Times [s], ascending, shape (k,).
         position: The measurements [m], shape (k, 3).
     """
-    if len(time) < ENDED_BY:
+    first = min(len(time) - ENDED_BY, int(np.searchsorted(time, time[-1] - SHORTEST)))
+    if first < 0:
         return float('inf')
-    way = float(np.linalg.norm(position[-1] - position[-ENDED_BY]))
-    return way / float(time[-1] - time[-ENDED_BY])
+    way = float(np.linalg.norm(position[-1] - position[first]))
+    return way / float(time[-1] - time[first])
