@@ -12,6 +12,7 @@ large. At ten times wrong minima already fit visibly worse, and are few: that is
 are compared, and where releases are tried again.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,7 +61,12 @@ class End:
     factor: float
 
 
-def begun(problem: Problem, drawn: np.random.Generator | None = None) -> End:
+Report = Callable[[int, float], None]  # called with the number of a step and the cost
+
+
+def begun(
+    problem: Problem, drawn: np.random.Generator | None = None, report: Report | None = None
+) -> End:
     """Return what a search finds while the noise comes down to HALFWAY times its value.
 
     All steps are FINE: rough ones can misread a gyro by more than its noise, and then favour a
@@ -70,6 +76,7 @@ def begun(problem: Problem, drawn: np.random.Generator | None = None) -> End:
         problem: The problem.
         drawn: Draws other beliefs, which the search heeds while the noise is very large; None for
             those of the problem.
+        report: Called after each step of the noise.
 
     Returns:
         The end. Its throws may still be in wrong minima of their releases.
@@ -77,20 +84,24 @@ def begun(problem: Problem, drawn: np.random.Generator | None = None) -> End:
     around = _with_first_releases(problem)
     other = around if drawn is None else _with_other_beliefs(around, drawn)
     x, cost = around.means.copy(), np.inf
-    for factor in _FACTORS:
+    for number, factor in enumerate(_FACTORS, 1):
         x, cost = minimised(_with_noise(other if factor > _TRUSTED else around, factor), x)
+        if report is not None:
+            report(number, cost)
     return End(around, x, cost, HALFWAY)
 
 
-def finished(halfway: End) -> End:
+def finished(halfway: End, report: Report | None = None) -> End:
     """Return the end of a search that has begun, with the noise of the problem.
 
-    Releases are tried again first: see `settled`.
+    Releases are tried again first: see `settled`. `report` is called after each step of the noise.
     """
     end = settled(halfway)
-    for factor in _LAST_FACTORS:
+    for number, factor in enumerate(_LAST_FACTORS, 1):
         x, cost = minimised(_with_noise(end.problem, factor), end.x)
         end = End(end.problem, x, cost, factor)
+        if report is not None:
+            report(number, cost)
     return end
 
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-import itertools
 
 import numpy as np
 
@@ -30,6 +29,7 @@ _STEPS = 12
 ROUNDS, DRAWN = 4, 3
 _NEAR = 60.0  # half squares above the best end: what two releases in wrong minima may cost
 _RELEASES = 'releases'
+_BEST, _FURTHER, _FURTHER_BEST = 'best search', 'further search', 'best further search'
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,17 @@ def stages(starts: int, *, turning: bool) -> dict[str, float]:
         Each with the time that it took in simulated sessions of five throws [s of CPU].
     """
     if turning:
-        return {_RELEASES: 20.0, _stage(0, starts): 0.3}
+        searches = dict.fromkeys(_searches(starts), 2.0)
+        return {**searches, _BEST: 18.0, _stage(0, starts): 0.3}
     return {_RELEASES: 4.0, **{_stage(number, starts): 1.0 for number in range(starts)}}
 
 
 def _stage(number: int, starts: int) -> str:
     return f'start {number + 1} of {starts}'
+
+
+def _searches(count: int, kind: str = 'search') -> list[str]:
+    return [f'{kind} {number} of {count}' for number in range(1, count + 1)]
 
 
 def started(problem: Problem, search: Search) -> Iterator[tuple[Problem, FloatArray]]:
@@ -135,22 +140,27 @@ def _graduated(problem: Problem, search: Search) -> Iterator[graduated.End]:
     In a wrong minimum residuals are usually correlated. Then more searches follow.
     """
     generator = np.random.default_rng(search.seed)
-    done = itertools.count(1)
 
-    def best(drawn: Sequence[np.random.Generator | None]) -> graduated.End:
-        begun = []
-        for source in drawn:
-            begun.append(graduated.begun(problem, source))
-            if search.progress is not None:
-                search.progress(_RELEASES, next(done), begun[-1].cost)
-        return graduated.finished(min(begun, key=lambda each: each.cost))
+    def report(stage: str) -> graduated.Report | None:
+        return None if search.progress is None else partial(search.progress, stage)
 
-    end = graduated.settled(best([None] + [generator] * (search.starts - 1)))
+    def best(
+        sources: Sequence[np.random.Generator | None], names: Sequence[str], name_of_best: str
+    ) -> graduated.End:
+        begun = [
+            graduated.begun(problem, source, report(name))
+            for source, name in zip(sources, names, strict=True)
+        ]
+        return graduated.finished(min(begun, key=lambda each: each.cost), report(name_of_best))
+
+    first = best([None] + [generator] * (search.starts - 1), _searches(search.starts), _BEST)
+    end = graduated.settled(first)
     yield end
-    for _ in range(ROUNDS):
+    further = _searches(ROUNDS * DRAWN, _FURTHER)
+    for k in range(0, len(further), DRAWN):
         if information.correlation(end.problem, end.x).is_chance:
             break
-        other = best([generator] * DRAWN)
+        other = best([generator] * DRAWN, further[k : k + DRAWN], _FURTHER_BEST)
         if other.cost < end.cost + _NEAR:
             other = graduated.settled(other)
         if other.cost < end.cost:
