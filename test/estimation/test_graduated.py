@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import report
-from disc_sim_ros.estimation.identification.fitting import fit_release, retry_releases, solve
+from disc_sim_ros.estimation.identification.fitting import retry_releases, solve
 from disc_sim_ros.estimation.identification.graduated import HALFWAY, begun, finished, settled
 from disc_sim_ros.estimation.identification.identify import Identification, identify, stages
 from disc_sim_ros.estimation.identification.information import (
@@ -21,6 +21,7 @@ from disc_sim_ros.estimation.identification.joint import minimised
 from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
 from disc_sim_ros.estimation.identification.observations import GYRO
 from disc_sim_ros.estimation.identification.problem import FINEST, Problem
+from disc_sim_ros.estimation.identification.release_fits import fit_release
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
 from estimation.synthetic_sessions import drawn, problem_of

@@ -5,7 +5,8 @@ from functools import cache
 import pytest
 
 from disc_sim_ros.estimation.identification import starting
-from disc_sim_ros.estimation.identification.fitting import ALIKE, cost_of_throw, fitted_alone
+from disc_sim_ros.estimation.identification.fitting import ALIKE, fitted_alone
+from disc_sim_ros.estimation.identification.normal_equations import cost_of_throw
 from disc_sim_ros.estimation.identification.observations import GYRO
 from disc_sim_ros.estimation.identification.starting import Search
 from disc_sim_ros.physics.disc_file import load_disc

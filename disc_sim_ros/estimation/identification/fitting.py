@@ -15,22 +15,23 @@ from disc_sim_ros.estimation.identification.normal_equations import (
     linear_blocks,
     reduced,
     robust_loss,
-    solved,
-    weights,
 )
 from disc_sim_ros.estimation.identification.observations import ATTITUDE, GYRO
 from disc_sim_ros.estimation.identification.problem import ROUGH, Problem
+from disc_sim_ros.estimation.identification.release_fits import (
+    MOST_TRIES,
+    SMALL,
+    fit_release,
+    fit_releases,
+)
 from disc_sim_ros.estimation.identification.throws import RELEASE_SIZE, Throw
 from disc_sim_ros.estimation.lift_coordinates import axis_in_flow
 
-_SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
 _HOPELESS = 1e-3  # the same as a share of a cost that is far above that of noise alone
-_MOST_TRIES = 8  # of a step with more and more damping
 KEPT = 3  # starts that are fitted, of those that are tried
 _MORE_KEPT = 12  # for a throw that fits worse than others
 ALIKE = 2.0  # ratio of the mean losses of two throws above which one is in a wrong minimum
 _FIRST_STEPS = 8
-_RELEASE_STEPS = 8  # of the fit of a release
 _GOING_ON, _MORE_STEPS = 6, 15  # fits of a thorough search that go on, and by how many steps
 # Attitudes about the path to start from: angle of attack and roll [degrees].
 _ATTACKS, _ROLLS = (-5.0, 5.0, 15.0), (-40.0, -20.0, 0.0, 20.0, 40.0)
@@ -68,45 +69,6 @@ class Solution:
 
     x: FloatArray
     cost: float
-
-
-def fit_release(
-    problem: Problem, k: int, here: FloatArray, most_steps: int = _RELEASE_STEPS
-) -> tuple[FloatArray, float]:
-    """Fit the release of throw `k` for given shared parameters.
-
-    Args:
-        problem: The problem.
-        k: Number of the throw.
-        here: The shared parameters and a first release, shape (shared + 12,).
-        most_steps: Gauss-Newton steps after which to end.
-
-    Returns:
-        The same with the fitted release, and the cost of the throw.
-    """
-    n, root = problem.shared, problem.throws[k].information
-    cost = cost_of_throw(problem, k, here)
-    damping = 1e-4
-    for _ in range(most_steps):
-        r, slopes = problem.linearised(k, here, release_only=True)
-        weighted = weights(r)[:, np.newaxis] * slopes
-        normal = slopes.T @ weighted + root.T @ root
-        gradient = weighted.T @ r + root.T @ problem.release_priors(k, here[n:])
-        before = cost
-        if _promised(normal, gradient) < _SMALL:
-            break
-        for _ in range(_MOST_TRIES):
-            step = solved(normal, -gradient, damping)
-            tried = here.copy()
-            tried[n:] += step
-            tried_cost = cost_of_throw(problem, k, tried)
-            if tried_cost < cost:
-                here, cost, damping = tried, tried_cost, damping * 0.1
-                break
-            damping = max(damping * 10.0, 1e-6)
-        if before - cost < _SMALL:
-            break
-    return here, cost
 
 
 def solve(
@@ -149,11 +111,11 @@ def solve(
             progress(stage, count, cost)
         equations = reduced(problem, x, linear_blocks(problem, x))
         before = cost
-        enough = _SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0)
+        enough = SMALL + _HOPELESS * max(cost - 2.0 * measured, 0.0)
         whole = equations.step(0.0)
         if -float(whole @ equations.gradient) / 2.0 < enough:
             break
-        for _ in range(_MOST_TRIES):
+        for _ in range(MOST_TRIES):
             tried, tried_cost = _released(problem, equations.moved(equations.step(damping)))
             if tried_cost < cost:
                 x, cost, damping = tried, tried_cost, damping * 0.1
@@ -174,11 +136,6 @@ def _released(problem: Problem, x: FloatArray) -> tuple[FloatArray, float]:
         x[problem.own(k)] = here[n:]
     prior = problem.shared_priors(x[:n])
     return x, float(sum(cost for _, cost in fitted) + 0.5 * (prior**2).sum())
-
-
-def _promised(normal: FloatArray, gradient: FloatArray) -> float:
-    """Return the decrease of the cost that a Gauss-Newton step promises."""
-    return -0.5 * float(gradient @ solved(normal, -gradient, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,16 +230,22 @@ class _Fit:
     here: FloatArray
     cost: float
 
-    def going_on(self) -> '_Fit':
-        """Return the fit after more steps."""
-        return _Fit(self.problem, *fit_release(self.problem, 0, self.here, _MORE_STEPS))
 
-
-def _fitted_from(problem: Problem, k: int, here: FloatArray, state: FloatArray) -> _Fit:
-    """Return the release of throw `k` fitted from a first state."""
-    alone = replace(problem, throws=(problem.throws[k].starting_at(state),))
+def _fits_from(
+    problem: Problem, k: int, here: FloatArray, states: Sequence[FloatArray]
+) -> list[_Fit]:
+    """Return the release of throw `k` fitted from each of several first states."""
+    alone = [replace(problem, throws=(problem.throws[k].starting_at(s),)) for s in states]
     first = np.concatenate([here[: problem.shared], np.zeros(RELEASE_SIZE)])
-    return _Fit(alone, *fit_release(alone, 0, first))
+    fitted = fit_releases(alone, 0, [first] * len(alone))
+    return [_Fit(p, *ends) for p, ends in zip(alone, fitted, strict=True)]
+
+
+def _going_on(fits: Sequence[_Fit]) -> list[_Fit]:
+    """Return fits after more steps."""
+    problems = [fit.problem for fit in fits]
+    fitted = fit_releases(problems, 0, [fit.here for fit in fits], _MORE_STEPS)
+    return [_Fit(p, *ends) for p, ends in zip(problems, fitted, strict=True)]
 
 
 def _kept(problem: Problem, x: FloatArray) -> list[int]:
@@ -299,14 +262,14 @@ def _fits_near(problem: Problem, k: int, here: FloatArray, kept: int) -> list[_F
     states, _, _ = problem.states_and_rows(k, here[np.newaxis])
     candidates = starts(problem.throws[k]) + _neighbours(states[0])
     best = promising(problem, k, here, candidates, kept)
-    return [_fitted_from(problem, k, here, state) for state in best]
+    return _fits_from(problem, k, here, best)
 
 
 def _fits_of_each_attitude(problem: Problem, k: int, here: FloatArray) -> list[_Fit]:
     """Return the best fits of throw `k` from one start of each attitude, after more steps."""
     first = _of_each_attitude(problem, k, here)
-    fits = [_fitted_from(problem, k, here, state) for state in first]
-    return [fit.going_on() for fit in sorted(fits, key=lambda fit: fit.cost)[:_GOING_ON]]
+    fits = _fits_from(problem, k, here, first)
+    return _going_on(sorted(fits, key=lambda fit: fit.cost)[:_GOING_ON])
 
 
 def promising(

@@ -22,7 +22,6 @@ from disc_sim_ros.estimation.identification.fitting import (
     Best,
     Progress,
     Solution,
-    fit_release,
     retry_releases,
     solve,
 )
@@ -30,6 +29,7 @@ from disc_sim_ros.estimation.identification.information import Unidentifiable
 from disc_sim_ros.estimation.identification.noise import HOPELESS, estimated_noise, refuse_misfit
 from disc_sim_ros.estimation.identification.observations import GYRO, NOISE
 from disc_sim_ros.estimation.identification.problem import FINE, FINEST, Prior, Problem
+from disc_sim_ros.estimation.identification.release_fits import fit_release
 from disc_sim_ros.estimation.identification.throws import Throw
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.frames import paper_from_map

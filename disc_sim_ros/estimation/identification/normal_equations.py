@@ -39,9 +39,13 @@ def costs_of_throw(problem: Problem, k: int, several: FloatArray) -> FloatArray:
     Returns:
         Shape (m,).
     """
+    return costs_of(problem, k, several, problem.whitened(k, several))
+
+
+def costs_of(problem: Problem, k: int, several: FloatArray, residuals: FloatArray) -> FloatArray:
+    """Return the same where the residuals are known, in standard deviations, shape (m, n)."""
     prior = problem.release_priors(k, several[:, problem.shared :])
-    loss = robust_loss(problem.whitened(k, several)).sum(axis=1)
-    costs: FloatArray = loss + 0.5 * (prior**2).sum(axis=1)
+    costs: FloatArray = robust_loss(residuals).sum(axis=1) + 0.5 * (prior**2).sum(axis=1)
     return costs
 
 

@@ -5,7 +5,7 @@ point on the ground under the camera, where there is one; and for each throw the
 first state in local coordinates and of its spin angle.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -177,8 +177,13 @@ class Problem:
 
     def predictions(self, k: int, parameters: FloatArray) -> list[FloatArray]:
         """Return the residuals of each instrument of throw `k` in its unit, each (m, n, d)."""
+        return self._predictions_from(k, *self.states_and_rows(k, parameters))
+
+    def _predictions_from(
+        self, k: int, states: FloatArray, rows: FloatArray, foot: FloatArray
+    ) -> list[FloatArray]:
+        """Return the same of flights that begin at first states; see `states_and_rows`."""
         throw = self.throws[k]
-        states, rows, foot = self.states_and_rows(k, parameters)
         sampled = fly_sampled(
             states, rows, self.setup, throw.times, step=self.step, duration=0.0
         ).states
@@ -189,10 +194,18 @@ class Problem:
 
     def whitened(self, k: int, parameters: FloatArray) -> FloatArray:
         """Return the residuals of throw `k` in standard deviations, shape (m, n)."""
+        return self.whitened_from(k, *self.states_and_rows(k, parameters))
+
+    def whitened_from(
+        self, k: int, states: FloatArray, rows: FloatArray, foot: FloatArray
+    ) -> FloatArray:
+        """Return the same of flights that begin at first states; see `states_and_rows`."""
         parts = [
-            r.reshape(len(parameters), -1) / self.noise[o.kind]
+            r.reshape(len(states), -1) / self.noise[o.kind]
             for o, r in zip(
-                self.throws[k].observations, self.predictions(k, parameters), strict=True
+                self.throws[k].observations,
+                self._predictions_from(k, states, rows, foot),
+                strict=True,
             )
         ]
         return np.nan_to_num(np.concatenate(parts, axis=1), nan=_LOST, posinf=_LOST, neginf=-_LOST)
@@ -222,15 +235,18 @@ class Problem:
         Returns:
             Residuals, shape (m,), and derivatives, shape (m, shared + 12) or (m, 12).
         """
+        near = self.neighbours(here, release_only=release_only)
+        return near.slopes(self.whitened(k, near.parameters))
+
+    def neighbours(self, here: FloatArray, *, release_only: bool = False) -> 'Neighbours':
+        """Return where to compute residuals for their derivatives; see `linearised`."""
         h = np.concatenate([_SHARED_STEP * self.shared_deviations, _RELEASE_STEPS])
         highest = np.concatenate([self.bounds[1], np.full(RELEASE_SIZE, np.inf)])
         h = np.where(here + h > highest, -h, h)
         every = np.arange(self.shared if release_only else 0, len(h))
         batch = np.tile(here, (len(every) + 1, 1))
         batch[1 + np.arange(len(every)), every] += h[every]
-        r = self.whitened(k, batch)
-        slopes: FloatArray = ((r[1:] - r[0]) / h[every, np.newaxis]).T
-        return r[0], slopes
+        return Neighbours(batch, h[every])
 
     def shared_priors(self, shared: FloatArray) -> FloatArray:
         """Return the residuals of the priors of the shared parameters, shape (shared,)."""
@@ -246,3 +262,46 @@ class Problem:
     def here(self, k: int, x: FloatArray) -> FloatArray:
         """Return the shared parameters and the release of throw `k`, shape (shared + 12,)."""
         return np.concatenate([x[: self.shared], x[self.own(k)]])
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Parameters and their neighbours in each direction.
+
+    Attributes:
+        parameters: Those in the middle first, shape (1 + d, shared + 12).
+        steps: From the first to each other, shape (d,).
+    """
+
+    parameters: FloatArray
+    steps: FloatArray
+
+    def slopes(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return residuals in the middle, shape (m,), and derivatives, (m, d), from (1 + d, m)."""
+        slopes: FloatArray = ((r[1:] - r[0]) / self.steps[:, np.newaxis]).T
+        return r[0], slopes
+
+
+def whitened_together(
+    finest: Problem, problems: Sequence[Problem], k: int, several: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Return the residuals of throw `k` of problems that differ in its first state alone.
+
+    Args:
+        finest: The one in whose step all flights are computed, at once.
+        problems: The problems.
+        k: Number of the throw.
+        several: Parameters for each problem, shape (m, shared + 12).
+
+    Returns:
+        Residuals in standard deviations for each problem, shape (m, n).
+    """
+    if not problems:
+        return []
+    flights = [
+        problem.states_and_rows(k, parameters)
+        for problem, parameters in zip(problems, several, strict=True)
+    ]
+    states, rows, foot = (np.concatenate(parts) for parts in zip(*flights, strict=True))
+    ends = np.cumsum([len(parameters) for parameters in several])
+    return np.split(finest.whitened_from(k, states, rows, foot), ends[:-1])
