@@ -110,7 +110,8 @@ class Reduced:
         x, gradient = self.x[: self.problem.shared], self.gradient
         free = ~(((x <= low) & (gradient > 0.0)) | ((x >= high) & (gradient < 0.0)))
         step = np.zeros_like(x)
-        step[free] = solved(self.normal[np.ix_(free, free)], -gradient[free], damping)
+        of_free = self.normal[np.ix_(free, free)]
+        (step[free],) = solved(of_free, -gradient[free], np.array([damping]))
         return np.clip(x + step, low, high) - x
 
     def moved(self, step: FloatArray) -> FloatArray:
@@ -146,11 +147,19 @@ def reduced(
     return Reduced(problem, x, normal, gradient, blocks, inverses)
 
 
-def solved(normal: FloatArray, right: FloatArray, damping: float) -> FloatArray:
-    """Return the damped Gauss-Newton step, in parameters of any units."""
+def solved(normal: FloatArray, right: FloatArray, dampings: FloatArray) -> FloatArray:
+    """Return damped Gauss-Newton steps, in parameters of any units.
+
+    Args:
+        normal: Normal equations, shape (n, n).
+        right: Their right-hand side, shape (n,).
+        dampings: Added to each element of the diagonal, which is scaled to 1, shape (m,).
+
+    Returns:
+        A step for each damping, shape (m, n).
+    """
     scale = 1.0 / np.sqrt(np.diag(normal))
     scaled = normal * np.outer(scale, scale)
-    step: FloatArray = scale * np.linalg.solve(
-        scaled + damping * np.eye(len(scale)), scale * right
-    )
-    return step
+    damped = scaled + dampings[:, np.newaxis, np.newaxis] * np.eye(len(scale))
+    steps: FloatArray = scale * np.linalg.solve(damped, (scale * right)[:, np.newaxis])[..., 0]
+    return steps

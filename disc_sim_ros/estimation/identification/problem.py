@@ -153,6 +153,11 @@ class Problem:
 
     # ---- flights ----
 
+    @cached_property
+    def _row(self) -> FloatArray:
+        """Return the constants of a flight with the base disc."""
+        return default_row(self.setup)
+
     def states_and_rows(
         self, k: int, parameters: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -166,7 +171,7 @@ class Problem:
         release = parameters[:, shared:]
         states = local.moved(self.throws[k].start, release[:, : local.SIZE])
         states[:, 13] += release[:, local.SIZE]
-        rows = np.tile(default_row(self.setup), (m, 1))
+        rows = np.tile(self._row, (m, 1))
         values = np.tile(self.held, (m, 1))
         n = len(self.free)
         values[:, list(self.free)] = parameters[:, :n]
@@ -296,8 +301,6 @@ def whitened_together(
     Returns:
         Residuals in standard deviations for each problem, shape (m, n).
     """
-    if not problems:
-        return []
     flights = [
         problem.states_and_rows(k, parameters)
         for problem, parameters in zip(problems, several, strict=True)

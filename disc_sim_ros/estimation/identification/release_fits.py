@@ -1,10 +1,10 @@
 """Fit the release of a throw for given shared parameters, from one first state or from several.
 
-Fits from several states go on side by side: their flights are computed together, and eight of
-them take as long as one.
+Fits from several states go on side by side: their flights are computed together, and WIDTH
+of them take as long as one.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 
@@ -13,6 +13,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification.normal_equations import costs_of, solved, weights
 from disc_sim_ros.estimation.identification.problem import Problem, whitened_together
+from disc_sim_ros.physics.kernels.simd import WIDTH
 
 SMALL = 1e-3  # decrease of the cost, in half squares of a standard deviation, that ends a search
 MOST_TRIES = 8  # of a step with more and more damping
@@ -59,6 +60,8 @@ def fit_releases(
     for _ in range(most_steps):
         _linearise(finest, going, k)
         going = [fit for fit in going if fit.promised() >= SMALL]
+        if not going:
+            break
         before = [fit.cost for fit in going]
         _step(finest, going, k)
         going = [fit for fit, cost in zip(going, before, strict=True) if cost - fit.cost >= SMALL]
@@ -100,19 +103,18 @@ class _Fit:
 
     def promised(self) -> float:
         """Return the decrease of the cost that a step without damping promises."""
-        return -0.5 * float(self.gradient @ solved(self.normal, -self.gradient, 0.0))
+        return -0.5 * float(self.gradient @ solved(self.normal, -self.gradient, np.zeros(1))[0])
 
-    def tried(self, dampings: Sequence[float]) -> FloatArray:
+    def tried(self, dampings: FloatArray) -> FloatArray:
         """Return where steps with these dampings end, shape (m, shared + 12)."""
         places = np.tile(self.here, (len(dampings), 1))
-        for place, damping in zip(places, dampings, strict=True):
-            place[self.problem.shared :] += solved(self.normal, -self.gradient, damping)
+        places[:, self.problem.shared :] += solved(self.normal, -self.gradient, dampings)
         return places
 
-    def take(self, dampings: Sequence[float], places: FloatArray, r: FloatArray) -> bool:
+    def take(self, dampings: FloatArray, places: FloatArray, r: FloatArray) -> bool:
         """Go to the first place that is better, with residuals `r`; return False if none is."""
         costs = costs_of(self.problem, self.k, places, r)
-        for damping, place, cost in zip(dampings, places, costs.tolist(), strict=True):
+        for damping, place, cost in zip(dampings.tolist(), places, costs.tolist(), strict=True):
             if cost < self.cost:
                 self.here, self.cost, self.damping = place.copy(), cost, damping * 0.1
                 return True
@@ -133,10 +135,14 @@ def _linearise(finest: Problem, fits: Sequence[_Fit], k: int) -> None:
 def _step(finest: Problem, fits: Sequence[_Fit], k: int) -> None:
     """Do one step of each fit, with as much damping as it takes to make it better.
 
-    Where the first try does not, all others are flown side by side.
+    As many tries of each are flown at once as take no longer than one of each, and where none of
+    these does, all others.
     """
-    for tries in (1, MOST_TRIES - 1):
-        dampings = [list(_dampings(fit.damping, tries)) for fit in fits]
+    at_once = max(WIDTH // max(len(fits), 1), 1)
+    for tries in (min(at_once, MOST_TRIES), MOST_TRIES - at_once):
+        if not fits or tries < 1:
+            break
+        dampings = [_dampings(fit.damping, tries) for fit in fits]
         places = [fit.tried(d) for fit, d in zip(fits, dampings, strict=True)]
         residuals = whitened_together(finest, [fit.problem for fit in fits], k, places)
         fits = [
@@ -146,11 +152,12 @@ def _step(finest: Problem, fits: Sequence[_Fit], k: int) -> None:
         ]
 
 
-def _dampings(first: float, count: int) -> Iterator[float]:
-    """Return a damping and larger ones."""
-    for _ in range(count):
-        yield first
-        first = _more(first)
+def _dampings(first: float, count: int) -> FloatArray:
+    """Return a damping and larger ones, shape (count,)."""
+    dampings = [first]
+    while len(dampings) < count:
+        dampings.append(_more(dampings[-1]))
+    return np.array(dampings)
 
 
 def _more(damping: float) -> float:
