@@ -31,11 +31,21 @@ BASE = Setup(disc=load_disc('ultrastar'))
 # below are 100 and more above it; what a minimum flattens by stopping early is 2. The same with
 # the noise of HALFWAY: 5 and more, and 0.4.
 NEAR, NEAR_HALFWAY = 10.0, 1.0
+ALL = slice(None)
 
 
-def session(seed: int) -> tuple[Problem, Problem, FloatArray]:
-    """Return a session of `benchmarks/identification.py --kinds gyro` and where it is true."""
+def session(seed: int, which: slice = ALL) -> tuple[Problem, Problem, FloatArray]:
+    """Return some throws of a session of `benchmarks/identification.py --kinds gyro`.
+
+    Args:
+        seed: Of the session.
+        which: Places of its throws.
+
+    Returns:
+        The problem, the same counted from the true releases, and the true parameters there.
+    """
     values, wind, throws = drawn(seed, BASE, (GYRO,), count=5)
+    throws = throws[which]
     problem = problem_of([throw for throw, _ in throws], BASE)
     true = [throw.starting_at(np.array(launch.state())) for throw, launch in throws]
     around = replace(problem, throws=tuple(true))
@@ -51,17 +61,21 @@ def least_halfway(around: Problem, true: FloatArray) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [332, 334])
-def test_a_search_that_begins_with_beliefs_alone_is_on_the_way_to_the_truth(seed: int):
-    """Begun with 100 times the noise in place of 1,000, each of 19 searches ended 3,000 above."""
-    problem, around, true = session(seed)
+@pytest.mark.parametrize(('seed', 'which'), [(332, slice(0, 4, 3)), (334, slice(2, 3))])
+def test_a_search_that_begins_with_beliefs_alone_is_on_the_way_to_the_truth(
+    seed: int, which: slice
+):
+    """Begun with 100 times the noise in place of 1,000 they are 35 and 12 above, and each of 19
+    searches with all throws ended 3,000 above.
+    """
+    problem, around, true = session(seed, which)
     assert begun(problem).cost < least_halfway(around, true) + NEAR_HALFWAY
 
 
 @pytest.mark.slow
 def test_releases_that_are_tried_again_halfway_lead_back_to_the_truth():
-    """Session 347 is 14 half squares above it when the search has begun."""
-    problem, around, true = session(347)
+    """The last throw of session 347 is 7 half squares above it when the search has begun."""
+    problem, around, true = session(347, slice(4, 5))
     least = least_halfway(around, true)
     first = begun(problem)
     assert first.cost > least + 5.0  # or this session no longer shows it
@@ -70,8 +84,8 @@ def test_releases_that_are_tried_again_halfway_lead_back_to_the_truth():
 
 @pytest.mark.slow
 def test_drawn_beliefs_find_what_those_of_the_problem_do_not():
-    """In session 337 those of the problem lead to an end 320 above."""
-    problem, around, true = session(337)
+    """Of three throws of session 337 those of the problem lead to another end."""
+    problem, around, true = session(337, slice(3))
     least = least_halfway(around, true)
     assert begun(problem).cost > least + 3.0
     halfway = begun(problem, np.random.default_rng(0))
@@ -102,17 +116,15 @@ def test_ctrl_c_keeps_what_was_found_before_further_searches():
 
 
 def test_ends_are_compared_in_steps_that_follow_the_flight():
-    """Of two fast throws an end in rough steps has a cost of 588, and of 9,957 in the finest.
+    """Of a fast throw an end in rough steps has a cost of 247, and of 1,783 in the finest.
 
     Fits that began at such an end of session 603 were lost.
     """
-    problem, _, _ = session(603)
-    fast = tuple(throw for throw in problem.throws if throw.start[12] > 68.0)
-    assert len(fast) == 2
-    end = finished(begun(replace(problem, throws=fast)))
+    problem, _, _ = session(603, slice(2, 3))
+    assert problem.throws[0].start[12] > 70.0
+    end = finished(begun(problem))
     finest = replace(end.problem, margin=FINEST)
-    in_finest = sum(cost_of_throw(finest, k, finest.here(k, end.x)) for k in range(2))
-    assert in_finest < 2.0 * end.cost
+    assert cost_of_throw(finest, 0, finest.here(0, end.x)) < 2.0 * end.cost
 
 
 def test_a_thorough_search_leaves_the_minimum_of_most_starts():

@@ -113,7 +113,7 @@ def test_a_throw_that_was_left_out_is_predicted(result):
 
 
 def test_the_same_seed_gives_the_same_answer():
-    throws = session(1, ('position',), values=base_of(BASE).values)
+    throws = [throw.until(0.8) for throw in session(1, ('position',))]
     first, again = (identify(throws, BASE, free=['C_D0'], starts=1, seed=3) for _ in range(2))
     assert np.array_equal(again.x, first.x)
 
