@@ -23,10 +23,12 @@ if 'full' in sys.argv:  # no file may grow beyond 1 kB: writing fails as on a fu
 if 'upgraded' in sys.argv:
     sys.version += ' and a patch'
 from disc_sim_ros.physics.kernels.code_cache import cache_folder
-from disc_sim_ros.physics.kernels.jit import entry
+from disc_sim_ros.physics.kernels.jit import entry, note_before
 @entry
 def triple(x):
     return 3.0 * x
+if 'noted' in sys.argv:
+    assert note_before(triple, seconds=3).startswith('compiling '), 'users wait unawares'
 print(triple(2.0), triple.hits, cache_folder())
 """
 
@@ -84,7 +86,8 @@ def test_where_no_folder_can_be_made_the_machine_code_stays_in_memory(
 ):
     """/proc is read-only, also for root, whom permissions do not stop."""
     (tmp_path / 'file').touch()
-    assert result_of(start(**{kind: str(tmp_path / place)})) == (('6.0', '0', 'None'), '')
+    started = start('noted', **{kind: str(tmp_path / place)})
+    assert result_of(started) == (('6.0', '0', 'None'), '')
 
 
 def test_a_full_disk_costs_one_line_and_the_next_start_is_sound(start, tmp_path):
