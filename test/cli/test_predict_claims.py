@@ -16,7 +16,7 @@ LATE = 1.0 / RATE + 1e-9  # s, at most from the last measurement to any time
 
 @pytest.fixture(scope='module')
 def flown():
-    return throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 6, rate=RATE)
+    return throw(Setup(disc=load_disc('ultrastar')), ThrowPrior(), 10, rate=RATE)  # of 2.4 s
 
 
 @pytest.fixture
