@@ -73,7 +73,7 @@ def test_colours_have_contrast_with_their_background(look):
 
 def test_a_picture_is_the_same_in_every_run_and_has_its_background():
     for look, kinds in ((LIGHT, ('png', 'svg')), (DARK, ('png',))):
-        figures = [FIGURES['3'].plot(computed('3'), look) for _ in range(2)]
+        figures = [FIGURES['8'].plot(computed('8'), look) for _ in range(2)]
         for kind in kinds:
             first, second = (style.image(figure, kind, look) for figure in figures)
             assert first == second
