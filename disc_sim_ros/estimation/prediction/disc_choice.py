@@ -81,23 +81,24 @@ class DiscChoice:
         return [int(i) for i in np.flatnonzero(self.weights >= LEAST_WEIGHT)]
 
     def landing_covariance(self) -> FloatArray:
-        """Return the mean squares of X, Y [m] and time [s] about the landing, shape (3, 3).
+        """Return the covariance of X, Y [m] and time [s] about the landing, shape (3, 3).
 
-        Over all models: one that lands elsewhere widens it by its weight. Of an unlikely one only
+        Over all models: one that lands elsewhere counts by its weight. Of an unlikely one only
         the landing counts, not its spread, which would take as long again. nan if too few of the
         drawn throws land.
         """
-        about, total, weight = self.fitted.landing, np.zeros((3, 3)), 0.0
+        landings, weights = [], []
         for i in self._kept:
             if i < self._likely or i == self.best:
-                landings = self._estimators[i].landings()
+                of_one = self._estimators[i].landings()
             else:
-                landings = self._landing_of(i)
-            covariance = covariance_about(landings, about)
-            if np.isfinite(covariance).all():
-                total += self.weights[i] * covariance
-                weight += self.weights[i]
-        return total / weight if weight > 0.0 else np.full((3, 3), np.nan)
+                of_one = self._landing_of(i)
+            of_one = of_one[np.isfinite(of_one).all(axis=1)]
+            landings.append(of_one)
+            weights.append(np.full(len(of_one), self.weights[i] / max(len(of_one), 1)))
+        return covariance_about(
+            self.fitted.landing, np.concatenate(landings), np.concatenate(weights)
+        )
 
     def _landing_of(self, i: int) -> FloatArray:
         fitted = self._estimators[i].fitted
