@@ -3,15 +3,18 @@
 To load Python, NumPy and ROS takes half a second of a core, and the tests start some hundred
 nodes; numba takes longer. One process for each test process loads them once; a program is then a
 copy of it, with arguments, environment, folder and output of its own. It runs as a program started
-anew does, in a process of its own; ROS is first initialised there. The tests of the start itself
-start anew.
+anew does, in a process of its own; ROS is first initialised there. What takes most of the time
+from there on is in memory too: the C code of messages, machine code, the disc. The tests of the
+start itself start anew.
 """
 
 import atexit
 from collections.abc import Mapping, Sequence
 import contextlib
 import functools
+import gc
 import importlib
+import inspect
 import json
 import os
 from pathlib import Path
@@ -203,7 +206,8 @@ def serve(number: int) -> dict[str, Any]:
         if not data:
             sys.exit()
         end, request = socket.socket(fileno=handles[0]), json.loads(data)
-        importlib.import_module(request['imports'])
+        prepare(request['imports'])
+        gc.freeze()  # the copy need not look for garbage in what is here
         pid = os.fork()
         if pid == 0:
             for one in (requests, end, *(other for _, other in running.values())):
@@ -213,6 +217,27 @@ def serve(number: int) -> dict[str, Any]:
             return request
         running[os.pidfd_open(pid)] = pid, end
         end.sendall(f'{pid}\n'.encode())
+
+
+@functools.cache
+def prepare(imports: str) -> None:
+    """Load a module, and if it is of a node what each node loads after it is made."""
+    importlib.import_module(imports)
+    if imports not in IMPORTS.values():
+        return
+    from rclpy.type_support import check_for_type_support
+
+    from disc_sim_ros.physics import disc_file
+
+    for name, module in list(sys.modules.items()):
+        if name.endswith(('.msg', '.srv')):
+            for kind in vars(module).values():
+                if hasattr(type(kind), '__import_type_support__'):
+                    check_for_type_support(kind)
+    inspect.getmodule(sys._getframe())  # for the log: finds the files of all modules
+    disc_file.load_disc('frisbee')
+    if 'disc_sim_ros.ros.sim.compiled_loop' in sys.modules:
+        sys.modules['disc_sim_ros.ros.sim.compiled_loop'].warm_up()
 
 
 def become(request: Mapping[str, Any]) -> None:

@@ -73,26 +73,6 @@ def test_the_flight_does_not_depend_on_the_clock(ros, request):
         wind(START + 450 * MS, -3.0, 1.0, 0.5),
     ]
     subscribed = (topics.IMU, *NOT_PERIODIC)
-    nodes = [PausedSim(ros, parameters, *subscribed, namespace=f'/{name}') for name in paces]
-    for node in nodes:
-        node.ready()
-    for node in nodes:
-        node.send(*commands)
-        node.throw()
-    others = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(2)]
-    for busy in others:
-        request.addfinalizer(busy.wait)
-        request.addfinalizer(busy.kill)
-    for node, pace in zip(nodes, paces.values(), strict=True):
-        node.go(pace)
-    stalled = nodes[-1]
-    stalled.wait_for(20)
-    stalled.sim.process.send_signal(signal.SIGSTOP)
-    nodes[2].wait_for_event('landed')
-    for busy in others:  # the other tests need the cores
-        busy.kill()
-    stalled.sim.process.send_signal(signal.SIGCONT)
-
     setup = Setup(disc=FRISBEE, wind=Wind(mean=(2.0, -1.0, 0.0), turbulence=15.0, seed=7))
     changes = [
         (0, control_change(M=-0.01, axes=DISC)),
@@ -106,6 +86,32 @@ def test_the_flight_does_not_depend_on_the_clock(ros, request):
     sim, states = resimulated(setup, SHORT.state(), 401, 5, changes)
     count = math.ceil(sim.touch_time * 200.0) + 1  # the last one is on the ground
     assert 200 < count < 401
+    nodes = [PausedSim(ros, parameters, *subscribed, namespace=f'/{name}') for name in paces]
+    for node in nodes:
+        node.ready()
+    for node in nodes:
+        node.send(*commands)
+        node.throw()
+    others = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(2)]
+    for busy in others:
+        request.addfinalizer(busy.wait)
+        request.addfinalizer(busy.kill)
+    for node, pace in zip(nodes, paces.values(), strict=True):
+        if pace in {0.0, 10.0}:  # they would go on to take a core to themselves
+            node.go(pace)
+            node.wait_for(count)
+            ros.pause(node.sim)
+    for node, pace in zip(nodes, paces.values(), strict=True):
+        if pace not in {0.0, 10.0}:
+            node.go(pace)
+    stalled = nodes[-1]
+    stalled.wait_for(20)
+    stalled.sim.process.send_signal(signal.SIGSTOP)
+    nodes[2].wait_for(count // 2)
+    for busy in others:  # the other tests need the cores
+        busy.kill()
+    nodes[2].wait_for_event('landed')
+    stalled.sim.process.send_signal(signal.SIGCONT)
     for node in nodes:
         landing = node.wait_for_event('landed')
         assert float(landing['flight_time_s']) == sim.touch_time

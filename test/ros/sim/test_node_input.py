@@ -152,7 +152,7 @@ def test_bad_commands_are_dropped_with_a_reason_and_the_flight_goes_on(ros):
     """The flight is bit for bit that of a simulator without commands; three share the commands."""
     spaces = ('/a', '/b', '/c')
     for space in (*spaces, '/alone'):
-        ros.start(LONG | {'real_time_factor': 2.0}, namespace=space)
+        ros.start(LONG | {'real_time_factor': 2.0, 'publish_rate': 50.0}, namespace=space)
     diagnostics = ros.subscribe(DiagnosticArray, '/diagnostics')
     odom = {s: ros.subscribe(Odometry, f'{s}/odom', raw=True) for s in (*spaces, '/alone')}
     publishers = {
