@@ -57,6 +57,7 @@ class Forked:
         errors: Path | None = None,
         environment: Mapping[str, str] = os.environ,
         imports: str = '',
+        before: str = '',
     ) -> None:
         """Run a program.
 
@@ -67,6 +68,7 @@ class Forked:
             errors: Another one for stderr; None for the same.
             environment: What it sees as its environment.
             imports: A module that is loaded before; '' for those of `IMPORTS`.
+            before: Python code that runs first in the copy.
         """
         self.returncode: int | None = None
         self._end, theirs = socket.socketpair()
@@ -74,6 +76,7 @@ class Forked:
             'program': str(program),
             'is_script': isinstance(program, Path),
             'imports': imports or IMPORTS[str(program)],
+            'before': before,
             'arguments': list(arguments),
             'output': str(output),
             'errors': str(errors or output),
@@ -127,8 +130,8 @@ def start(
 ) -> Forked | subprocess.Popen[bytes]:
     """Run a module of `IMPORTS` in a process of its own.
 
-    Anew where `before`, Python code, has to run first, or where the environment is another one
-    than that of the server, in what is read before ROS is initialised.
+    Anew where the environment is another one than that of the server, in what is read before ROS
+    is initialised.
 
     Args:
         module: What `python -m` runs.
@@ -137,8 +140,8 @@ def start(
         before: Python code that runs first.
     """
     output.write_bytes(b'')
-    if not before and _environment() == _server().environment:
-        return Forked(module, arguments, output)
+    if _environment() == _server().environment:
+        return Forked(module, arguments, output, before=before)
     program = f'{before}\nimport runpy\nrunpy.run_module({module!r}, run_name="__main__")'
     with output.open('wb') as file:
         command = [sys.executable, '-c', program, *arguments]
@@ -250,5 +253,9 @@ def become(request: Mapping[str, Any]) -> None:
     os.environ.update(request['environment'])
     os.chdir(request['folder'])
     sys.argv = ['-c', *request['arguments']]
-    run = runpy.run_path if request['is_script'] else runpy.run_module
+    exec(request['before'], {})
+    run = runpy.run_module
+    if request['is_script']:
+        sys.path.insert(0, str(Path(request['program']).parent))
+        run = runpy.run_path
     run(request['program'], run_name='__main__')

@@ -14,9 +14,11 @@ pytestmark = pytest.mark.ros
 # A throw for which the thread of the simulation takes long.
 SLOW_THROW = """
 import time
+from disc_sim_ros.ros.sim import services
 from disc_sim_ros.ros.sim.loop import SimLoop
 throw = SimLoop.throw
-SimLoop.throw = lambda self: (time.sleep(7.0), throw(self))[1]
+SimLoop.throw = lambda self: (time.sleep(4.0), throw(self))[1]
+services.PATIENCE = 2.0
 """
 
 
@@ -31,7 +33,7 @@ def test_a_thread_that_is_stuck_is_not_in_time_and_its_answer_says_that_it_acts(
     ros.spin_until(lambda: 'in time' in said(diagnostics), 'the ordinary message')
     response = ros.call(sim, 'throw')
     assert not response.success
-    assert response.message.endswith('did not answer within 5 s, but has begun to act')
+    assert response.message.endswith('did not answer within 2 s, but has begun to act')
     diagnostics.clear()
     ros.spin_until(lambda: diagnostics, 'diagnostics')
     assert 'no step for' in said(diagnostics)[0]
