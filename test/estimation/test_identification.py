@@ -119,7 +119,7 @@ def test_the_same_seed_gives_the_same_answer():
 
 
 def test_a_coefficient_that_the_throws_do_not_tell_is_refused():
-    path = session(1, ('position',))
+    path = [throw.until(1.5) for throw in session(1, ('position',))]
     with pytest.raises(ConfigError, match=r"free: 'C_Nr'.*discs differ by 0.005.*--anyway"):
         identify(path, BASE, free=['damping', 'C_Nr'], starts=1)
 
@@ -135,7 +135,7 @@ def test_no_disc_gives_such_a_path():
 
 
 def test_ctrl_c_keeps_the_best_so_far():
-    throws = session(1, ('position', 'gyro'))
+    throws = [throw.until(1.0) for throw in session(1, ('position', 'gyro'))]
 
     def interrupt(stage: str, count: int, _cost: float) -> None:
         if stage == 'noise' and count == 2:
