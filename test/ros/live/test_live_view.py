@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
-pytest.importorskip('trimesh')
 pytest.importorskip('websockets.asyncio')
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -31,8 +30,10 @@ from disc_sim_ros.ros.live.node import SENT
 from disc_sim_ros.ros.live.options import live_config
 from disc_sim_ros.ros.live.server import LiveServer
 from forked import start
+import installed
 from ros.sim_process import DEADLINE
 
+installed.need('trimesh')
 pytestmark = pytest.mark.ros
 PAGE = b'<!DOCTYPE html><title>x</title>'
 THROW = {'speed': 12.0, 'pitch': 10.0, 'spin': 40.0, 'height': 1.0}
