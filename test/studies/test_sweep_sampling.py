@@ -170,24 +170,33 @@ def test_a_scatter_needs_a_standard_deviation(sd):
 
 INTERRUPTED = """
 from contextlib import suppress
-import signal
+import os, signal, sys
 from scipy.stats import qmc
 from disc_sim_ros.studies.sampling import load_sobol
 
-signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
-signal.setitimer(signal.ITIMER_REAL, {delay})
-with suppress(KeyboardInterrupt):
-    load_sobol()
-print(qmc.Sobol(40, scramble=False).random(8).tolist())
+for delay in sys.argv[1:]:
+    if os.fork() == 0:
+        signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+        signal.setitimer(signal.ITIMER_REAL, float(delay))
+        with suppress(KeyboardInterrupt):
+            load_sobol()
+        print(qmc.Sobol(40, scramble=False).random(8).tolist(), flush=True)
+        os._exit(0)
+    _, status = os.wait()
+    assert status == 0
 """
 
 
-@pytest.mark.parametrize('delay', [0.001, 0.003, 0.01])
-def test_ctrl_c_leaves_scipy_no_half_table_of_direction_numbers(delay):
-    """Its compiled code prints KeyboardInterrupt and goes on, with other points from then on."""
+def test_ctrl_c_leaves_scipy_no_half_table_of_direction_numbers():
+    """Its compiled code prints KeyboardInterrupt and goes on, with other points from then on.
+
+    Each process makes the table anew: a copy of one that has loaded scipy and not made it.
+    """
+    delays = ('0.001', '0.003', '0.01')  # s
     done = subprocess.run(
-        [sys.executable, '-c', INTERRUPTED.format(delay=delay)],
+        [sys.executable, '-c', INTERRUPTED, *delays],
         capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
     assert done.stderr == ''
-    assert json.loads(done.stdout) == stats.qmc.Sobol(40, scramble=False).random(8).tolist()
+    points = [json.loads(line) for line in done.stdout.splitlines()]
+    assert points == [stats.qmc.Sobol(40, scramble=False).random(8).tolist()] * len(delays)

@@ -151,9 +151,9 @@ def test_the_shape_is_a_closed_disc_of_diameter_1():
         assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0, abs=1e-6)
         of = places[corners]
         across = np.cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0])
-        seen = np.einsum('ij,ij->i', across, normals[corners].mean(axis=1))
+        outward = np.einsum('ij,ij->i', across, normals[corners].mean(axis=1))
         flat = np.linalg.norm(across, axis=1) < 1e-9  # at the middle, where two corners are one
-        assert (seen[~flat] > 0.0).all()
+        assert (outward[~flat] > 0.0).all()
         triangles.append(of[~flat].round(5))
     every = np.concatenate(triangles)
     assert np.hypot(every[..., 0], every[..., 1]).max() == pytest.approx(0.5, abs=1e-5)
