@@ -100,13 +100,14 @@ def test_bag_of_the_simulator_gives_its_landing(capsys):
     assert any(line.strip().startswith('1.0') for line in rest)
 
 
-@pytest.mark.parametrize('spin', [31.4, -31.4])
-def test_another_disc_with_a_slow_spin_either_way_is_followed(spin, tmp_path, capsys):
+@pytest.mark.parametrize(('spin', 'duration'), [(31.4, 2.2), (-31.4, 3.2)])  # s
+def test_another_disc_with_a_slow_spin_either_way_is_followed(spin, duration, tmp_path, capsys):
     """The search stayed at a corner of the table: 1.1 m off from 0.5 to 2.2 s. A disc that spun
     the other way was lost twice in flight, as by a hand, and taken for three throws.
     """
     bag = str(tmp_path / 'bag')
-    assert fly.main(['--bag', bag, '--spin', str(spin), '--disc', 'frisbee']) == 0
+    thrown = ['--spin', str(spin), '--disc', 'frisbee', '--duration', str(duration)]
+    assert fly.main(['--bag', bag, *thrown]) == 0
     capsys.readouterr()
     assert predict.main([bag, '--disc', 'ultrastar', '--json']) == 0
     first, *more = json.loads(capsys.readouterr().out)['throws']

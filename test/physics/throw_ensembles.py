@@ -35,7 +35,7 @@ def ensemble(release: Launch, wind: tuple[float, float, float], disc: Disc, n: i
             'wind_x': wind[0] + WIND * draw[6],
             'wind_y': wind[1] + WIND * draw[7],
         },
-        Setup(disc=disc, step=0.002),
+        Setup(disc=disc),
     )
 
 
