@@ -29,9 +29,9 @@ def write(path: Path, columns: list[str], rows: object) -> Path:
 
 @pytest.fixture(scope='module')
 def throw(tmp_path_factory) -> Path:
-    """Return a file with positions of a flight of `ultrastar`, to 5 mm."""
+    """Return a file with positions of the first 1.5 s of a flight of `ultrastar`, to 5 mm."""
     launch = Launch(speed=18.0, pitch=10.0, spin=60.0, height=1.3)
-    flight = fly_disc(launch, Setup(disc=load_disc('ultrastar')), sample_rate=60.0)
+    flight = fly_disc(launch, Setup(disc=load_disc('ultrastar')), sample_rate=60.0, duration=1.5)
     trajectory = flight.trajectory
     noise = np.random.default_rng(1).normal(0.0, 0.005, trajectory.position.shape)
     rows = np.column_stack([trajectory.t, map_from_paper(trajectory.position) + noise])
