@@ -181,6 +181,7 @@ def test_a_robot_runs_to_the_predicted_landing_and_catches_the_disc(ros, tmp_pat
         {
             'disc': 'ultrastar',
             'auto_throw': False,
+            'publish_rate': 100.0,
             'launch.speed': 17.0,
             'launch.height': 1.3,
             'launch.spin': 60.0,

@@ -75,7 +75,7 @@ def test_topics_that_others_alone_have_subscribed_to_are_not_recorded(ros, tmp_p
 
 def test_it_throws_when_a_predictor_follows(ros, tmp_path):
     """The first prediction belongs to the first flight."""
-    ros.start({'auto_throw': False})
+    ros.start({'auto_throw': False, 'publish_rate': 50.0})
     events = ros.subscribe(DiagnosticStatus, 'flight_events')
     landings = ros.subscribe(PoseWithCovarianceStamped, PredictorTopic.LANDING)
     throw = start(PROGRAM, ['--predictor'], tmp_path / 'throw.txt')
