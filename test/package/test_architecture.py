@@ -46,43 +46,50 @@ def test_the_import_rules_hold(tree):
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-@pytest.mark.parametrize(
-    ('where', 'line', 'broken'),
-    [
-        ('physics', 'import rclpy', 'only ros and cli know ROS'),
-        ('physics', 'from nav_msgs.msg import Odometry', 'only ros and cli know ROS'),
-        ('analysis', 'import rclpy', 'only ros and cli know ROS'),
-        ('physics', 'import matplotlib', 'the physics draws nothing and records nothing'),
-        ('physics', 'import mcap', 'the physics draws nothing and records nothing'),
-        ('physics', f'import {PACKAGE}.bags', 'one direction, down to the physics'),
-        ('bags', f'import {PACKAGE}.analysis', 'one direction, down to the physics'),
-        ('paper', f'import {PACKAGE}.ros', 'one direction, down to the physics'),
-        ('analysis', f'import {PACKAGE}.studies', 'one direction, down to the physics'),
-        ('physics', 'import scipy', 'the physics draws nothing and records nothing'),
-        (
-            'physics/kernels',
-            f'import {PACKAGE}.validation',
-            'the kernels are arithmetic: no files, no messages, no units for people',
-        ),
-        (
-            'estimation/prediction',
-            f'import {PACKAGE}.estimation.identification.fitting',
-            'predicting a landing and identifying a disc share only what measures',
-        ),
-        (
-            'estimation/identification',
-            f'import {PACKAGE}.estimation.prediction.prior',
-            'predicting a landing and identifying a disc share only what measures',
-        ),
-        ('ros', f'import {PACKAGE}.cli', 'one direction, down to the physics'),
-    ],
-)
-def test_the_linter_reports_a_violation(tree, where, line, broken):
-    (tree / PACKAGE / where / 'violation.py').write_text(f'{line}\n', encoding='utf-8')
+# Folder, line, and the rule that a module with this line breaks there.
+VIOLATIONS = [
+    ('physics', 'import rclpy', 'only ros and cli know ROS'),
+    ('physics', 'from nav_msgs.msg import Odometry', 'only ros and cli know ROS'),
+    ('analysis', 'import rclpy', 'only ros and cli know ROS'),
+    ('physics', 'import matplotlib', 'the physics draws nothing and records nothing'),
+    ('physics', 'import mcap', 'the physics draws nothing and records nothing'),
+    ('physics', f'import {PACKAGE}.bags', 'one direction, down to the physics'),
+    ('bags', f'import {PACKAGE}.analysis', 'one direction, down to the physics'),
+    ('paper', f'import {PACKAGE}.ros', 'one direction, down to the physics'),
+    ('analysis', f'import {PACKAGE}.studies', 'one direction, down to the physics'),
+    ('physics', 'import scipy', 'the physics draws nothing and records nothing'),
+    (
+        'physics/kernels',
+        f'import {PACKAGE}.validation',
+        'the kernels are arithmetic: no files, no messages, no units for people',
+    ),
+    (
+        'estimation/prediction',
+        f'import {PACKAGE}.estimation.identification.fitting',
+        'predicting a landing and identifying a disc share only what measures',
+    ),
+    (
+        'estimation/identification',
+        f'import {PACKAGE}.estimation.prediction.prior',
+        'predicting a landing and identifying a disc share only what measures',
+    ),
+    ('ros', f'import {PACKAGE}.cli', 'one direction, down to the physics'),
+]
+
+
+def test_the_linter_reports_each_violation(tree):
+    """All in one tree: each is reported below its rule."""
+    for number, (where, line, _) in enumerate(VIOLATIONS):
+        (tree / PACKAGE / where / f'violation_{number}.py').write_text(f'{line}\n')
     result = lint(tree)
     assert result.returncode == 1, result.stdout + result.stderr
-    assert f'{broken} BROKEN' in result.stdout
-    assert 'violation' in result.stdout
+    _, _, reports = result.stdout.partition('Broken contracts\n')
+    _, *parts = re.split(f'^({"|".join(map(re.escape, contracts()))})$', reports, flags=re.M)
+    report_of = dict(zip(parts[::2], parts[1::2], strict=True))
+    for number, (where, line, rule) in enumerate(VIOLATIONS):
+        module = f'{PACKAGE}.{where.replace("/", ".")}.violation_{number}'
+        assert f'{rule} BROKEN' in result.stdout
+        assert re.search(rf'{re.escape(module)} -> ', report_of[rule]), (where, line)
 
 
 def test_every_folder_is_under_the_rules():
