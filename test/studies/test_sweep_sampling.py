@@ -9,7 +9,6 @@ import warnings
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 import pytest
-from scipy import stats
 
 from disc_sim_ros.errors import ConfigError
 from disc_sim_ros.physics import disc_file
@@ -21,6 +20,14 @@ from disc_sim_ros.studies.scatter import Normal, Uniform, probabilities
 from disc_sim_ros.studies.study import Study
 
 SETUP = Setup(disc=disc_file.load_disc('frisbee'), step=0.01)
+
+
+@pytest.fixture(scope='module')
+def stats():
+    """`scipy.stats`, which is slow to load: one of three workers needs it."""
+    from scipy import stats
+
+    return stats
 
 
 def study_of(**changes) -> Study:
@@ -37,7 +44,7 @@ def test_a_sample_is_the_same_wherever_it_is_drawn(method):
     assert not np.any(whole == sampling.unit_samples(method, 5, 8, 0, 10_000, count=10_000))
 
 
-def test_sobol_points_before_scrambling_are_those_of_scipy():
+def test_sobol_points_before_scrambling_are_those_of_scipy(stats):
     index = np.arange(1000)
     gray = index ^ (index >> 1)
     basis = sampling._sobol_basis(6, 10)
@@ -69,7 +76,7 @@ def test_sobol_integrates_better_than_random_samples():
     assert errors['sobol'] < errors['random'] / 10
 
 
-def test_scattered_quantities_follow_their_laws():
+def test_scattered_quantities_follow_their_laws(stats):
     study = study_of(
         scatter={'speed': Normal(1.5, 20.0), 'pitch': Uniform(5.0, 15.0), 'roll': Normal(2.0)},
         launch=Launch(roll=-4.0), count=20_000, seed=5,
@@ -93,7 +100,7 @@ def test_correlations_are_as_given():
     assert_allclose(matrix, [[1, 0.8, 0], [0.8, 1, -0.3], [0, -0.3, 1]], atol=2e-3)
 
 
-def test_a_normal_law_is_truncated_at_the_bounds_of_the_quantity():
+def test_a_normal_law_is_truncated_at_the_bounds_of_the_quantity(stats):
     study = study_of(scatter={'height': Normal(1.0, 0.5)}, count=20_000)
     height = study.values(0, 20_000)['height']
     assert height.min() >= 0.0
@@ -187,7 +194,7 @@ for delay in sys.argv[1:]:
 """
 
 
-def test_ctrl_c_leaves_scipy_no_half_table_of_direction_numbers():
+def test_ctrl_c_leaves_scipy_no_half_table_of_direction_numbers(stats):
     """Its compiled code prints KeyboardInterrupt and goes on, with other points from then on.
 
     Each process makes the table anew: a copy of one that has loaded scipy and not made it.
