@@ -86,7 +86,7 @@ def problem(chosen: argparse.Namespace, words: Sequence[str]) -> 'Problem':
         UsageError: Accuracy without a target.
         ConfigError: Flags contradict each other, or a value is out of range.
     """
-    from disc_sim_ros.studies import optimise  # noqa: PLC0415 - scipy
+    from disc_sim_ros.studies import optimise  # noqa: PLC0415
     from disc_sim_ros.studies.study import Study  # noqa: PLC0415
 
     flags = {word.partition('=')[0] for word in words}

@@ -1,6 +1,6 @@
 """Search of the launch with the best range, time of flight or accuracy, also under scatter."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 import inspect
@@ -8,7 +8,6 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
@@ -192,6 +191,8 @@ def optimise(problem: Problem, seed: int = 0) -> Optimum:
     7 (1965) 308-313; both as implemented in scipy.
     """
     sign = 1.0 if problem.goal == ACCURACY else -1.0
+    from scipy import optimize  # noqa: PLC0415 - 0.2 s, which --help need not wait for
+
     low, high = np.array(list(problem.limits.values())).T
     samples = problem.study.count
     evaluated = 0
@@ -212,7 +213,7 @@ def optimise(problem: Problem, seed: int = 0) -> Optimum:
         maxiter=_GENERATIONS_OF_SCATTER if problem.scatters else _GENERATIONS,
         tol=_TOLERANCE_OF_SCATTER if problem.scatters else _TOLERANCE,
         polish=False,
-        **_seeded(seed),
+        **_seeded(optimize.differential_evolution, seed),
     ).x
     for width in (0.05, 0.005):  # twice, because a simplex can collapse
         simplex = np.clip(best + width * np.vstack([np.zeros(len(low)), np.eye(len(low))]), 0, 1)
@@ -289,9 +290,9 @@ def _rounded(value: float, low: float, high: float) -> float:
     return float(min(max(round(float(value), digits), low), high))
 
 
-def _seeded(seed: int) -> dict[str, Any]:
-    """Return the seed as the argument that the installed scipy takes."""
-    known = inspect.signature(optimize.differential_evolution).parameters
+def _seeded(search: Callable[..., Any], seed: int) -> dict[str, Any]:
+    """Return the seed as the argument that a search of the installed scipy takes."""
+    known = inspect.signature(search).parameters
     return {'rng' if 'rng' in known else 'seed': np.random.default_rng(seed)}
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtr, ndtri
 
 from disc_sim_ros import validation
 from disc_sim_ros.arrays import FloatArray
@@ -56,6 +55,8 @@ def quantiles(
         lowest: Lower bound of the quantity; a normal law is truncated there.
         highest: Upper bound, likewise.
     """
+    from scipy.special import ndtr, ndtri  # noqa: PLC0415 - 0.1 s, which --help need not wait for
+
     if isinstance(law, Uniform):
         values: FloatArray = law.low + (law.high - law.low) * ndtr(scores)
         return values
@@ -75,6 +76,8 @@ def probabilities(
     if isinstance(law, Uniform):
         below_value = (values - law.low) / (law.high - law.low)
         return below_value
+    from scipy.special import ndtr  # noqa: PLC0415 - as above
+
     mean = centre if law.mean is None else law.mean
     below, above = ndtr([(lowest - mean) / law.sd, (highest - mean) / law.sd])
     below_value = (ndtr((values - mean) / law.sd) - below) / (above - below)

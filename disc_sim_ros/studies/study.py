@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from disc_sim_ros import __version__, validation
 from disc_sim_ros.arrays import FloatArray
@@ -134,6 +133,8 @@ class Study:
 
     def scores(self, start: int, stop: int) -> FloatArray:
         """Return the standard normal scores of samples, shape (stop - start, scattered)."""
+        from scipy.special import ndtri  # noqa: PLC0415 - as in `scatter`
+
         unit = sampling.unit_samples(
             self.sampling, len(self.scatter), self.seed, start, stop, count=self.count
         )
