@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import math
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.identification import information
@@ -102,6 +101,8 @@ def marginal(
 
 def posterior(points: list[Point], place: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return dampings, the share of each, and the parameters there, shape (n, p)."""
+    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - not every session needs it
+
     u = np.log([point.damping + _OFFSET for point in points])
     cost = np.array([point.cost for point in points])
     fine = np.linspace(u[0], u[-1], _FINE)
