@@ -11,6 +11,7 @@ start itself start anew.
 import atexit
 from collections.abc import Mapping, Sequence
 import contextlib
+import ctypes
 import functools
 import gc
 import importlib
@@ -211,7 +212,7 @@ def serve(number: int) -> dict[str, Any]:
         end, request = socket.socket(fileno=handles[0]), json.loads(data)
         prepare(request['imports'])
         gc.freeze()  # the copy need not look for garbage in what is here
-        pid = os.fork()
+        pid = fork()
         if pid == 0:
             for one in (requests, end, *(other for _, other in running.values())):
                 one.close()
@@ -220,6 +221,29 @@ def serve(number: int) -> dict[str, Any]:
             return request
         running[os.pidfd_open(pid)] = pid, end
         end.sendall(f'{pid}\n'.encode())
+
+
+def fork() -> int:
+    """Fork, and tell LTTng, which the wheels of ROS load.
+
+    It has two threads, which a copy does not have. Without a word it would end them with the copy
+    nevertheless: a segmentation fault, if their memory is in use for something else by then.
+    """
+    maps = Path('/proc/self/maps').read_text(encoding='utf-8')
+    paths = {line.split(maxsplit=5)[-1] for line in maps.splitlines() if '/liblttng-ust' in line}
+    libraries = [ctypes.CDLL(path, mode=os.RTLD_NOLOAD | os.RTLD_NOW) for path in paths]
+    signals = ctypes.create_string_buffer(128)  # a sigset_t
+
+    def tell(what: str) -> None:
+        for library in libraries:
+            for name in (f'ust_{what}', f'lttng_ust_{what}'):  # until LTTng 2.12, and since
+                if hasattr(library, name):
+                    getattr(library, name)(signals)
+
+    tell('before_fork')
+    pid = os.fork()
+    tell('after_fork_parent' if pid else 'after_fork_child')
+    return pid
 
 
 @functools.cache

@@ -50,20 +50,7 @@ def start(name: str, *arguments: str) -> subprocess.Popen:
 
 
 def run(name: str, *arguments: str) -> str:
-    """Run an example to its end and return its stdout."""
-    process = start(name, *arguments)
-    try:
-        output, errors = process.communicate(timeout=DEADLINE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        pytest.fail(f'{name} did not end:\n{process.communicate()}')
-    assert process.returncode == 0, f'{output}\n{errors}'
-    assert errors == ''
-    return output
-
-
-def run_copy(name: str, *arguments: str) -> str:
-    """Run an example as `run` does, in a copy of a process with ROS in it."""
+    """Run an example to its end, as a copy of a process with ROS in it; return its stdout."""
     with tempfile.TemporaryDirectory() as folder:
         output, errors = Path(folder, 'output'), Path(folder, 'errors')
         for path in (output, errors):
@@ -108,7 +95,7 @@ def test_throw_flies_as_the_physics_computes(ros, namespace):
     launch = {'speed': 18.0, 'pitch': 12.0, 'roll': 7.0, 'yaw': 25.0, 'spin': 40.0, 'height': 1.2}
     options = itertools.chain(*((f'--{name}', str(value)) for name, value in launch.items()))
     remap = ('--ros-args', '-r', f'__ns:={namespace}') if namespace else ()
-    output = run_copy('throw.py', *options, *remap)
+    output = run('throw.py', *options, *remap)
     flight = fly(Launch(**launch), FRISBEE)
     assert output.splitlines() == [
         'thrown: 18.00 m/s, spin 40.00 rad/s',
@@ -122,7 +109,7 @@ def test_throw_flies_as_the_physics_computes(ros, namespace):
 
 def test_throw_replaces_a_flying_disc_and_reports_its_own_flight(ros):
     ros.start({'real_time_factor': 4.0, 'launch.speed': 30.0, 'launch.height': 1000.0})
-    output = run_copy('throw.py', '--speed', '15')
+    output = run('throw.py', '--speed', '15')
     assert output.splitlines() == [
         'thrown: 15.00 m/s, spin 31.42 rad/s; flight 1 ended in the air',
         'landed: 25.80 m in 3.682 s',
@@ -163,7 +150,7 @@ def test_throw_can_be_interrupted(ros):
 
 def test_steer_turns_the_flight_as_the_physics_computes(ros):
     ros.start(WAITING)
-    output = run_copy('steer.py', '--command', '0.001', '0.005', '0.002')
+    output = run('steer.py', '--command', '0.001', '0.005', '0.002')
     ends = [
         list(map(float, re.findall(r'-?\d+\.\d\d(?= m)', line))) for line in output.splitlines()
     ]
@@ -192,7 +179,7 @@ def test_a_robot_runs_to_the_predicted_landing_and_catches_the_disc(ros, tmp_pat
         launch = Launch(speed=17.0, height=1.3, spin=60.0)
         X, Y, _ = fly(launch, Setup(disc=disc_file.load_disc('ultrastar'))).position
         at = (X - 6.0, -Y - 5.0)  # in map
-        assert run_copy('catch.py', '--at', *map(str, at)).endswith('caught\n')
+        assert run('catch.py', '--at', *map(str, at)).endswith('caught\n')
         predictor.end()
 
 
