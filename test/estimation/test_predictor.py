@@ -335,10 +335,13 @@ def test_uncertain_disc_widens_the_ellipse(throws):
     config = PredictorConfig(
         setup=SETUP, prior=ThrowPrior(offsets=disc_offsets(load_disc('ultrastar')))
     )
-    for t in throws[:3]:
+    ratios = []
+    for t in throws[:6]:
         known = follow(t.measurements(axis=True), 1.0).covariance
         unknown = follow(t.measurements(axis=True), 1.0, config).covariance
-        assert np.trace(unknown[:2, :2]) > np.trace(known[:2, :2])
+        ratios.append(np.trace(unknown[:2, :2]) / np.trace(known[:2, :2]))
+    # Of one throw it may be narrower: the spin that its nutation seems to have is another one.
+    assert np.median(ratios) > 1.5
 
 
 def test_memory_of_a_throw_is_bounded(throws):

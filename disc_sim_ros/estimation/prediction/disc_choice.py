@@ -4,15 +4,22 @@ Models differ in the disc, or in the way in which it spins.
 """
 
 from collections.abc import Sequence
+import math
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation.prediction.ellipse import covariance_about
-from disc_sim_ros.estimation.prediction.throw_estimator import ThrowEstimator
+from disc_sim_ros.estimation.prediction.nutation import SPIN, SpinBelief
+from disc_sim_ros.estimation.prediction.throw_estimator import MOST_MORE, ThrowEstimator
 from disc_sim_ros.estimation.prediction.throw_fit import Fitted, Linear, Measurements, Model
 
 LEAST_WEIGHT = 1e-6  # a model below it is left out for the rest of the throw
+_WEIGHING_PERIOD = 0.1  # s
+_CERTAIN = 0.99  # probability of a model from which spins are weighed
+_SAME_SPIN = 2.0  # rad/s within which an estimate with another spin goes on
+_FIRST_STEPS = 2
+_WORSE = 30.0  # half squares by which a throw with a known spin may fit worse, and no more
 
 
 class DiscChoice:
@@ -39,18 +46,25 @@ class DiscChoice:
         self.weights[len(models) :] = share / max(len(unlikely), 1)
         self._expected = np.log(np.maximum(self.weights, LEAST_WEIGHT))
         self.best = 0
+        self._by_nutation: ThrowEstimator | None = None  # follows the spin that it tells
+        self._belief: SpinBelief | None = None
+        self._weighed = -math.inf  # s since the first measurement, when spins were weighed
+
+    @property
+    def _leading(self) -> ThrowEstimator:
+        return self._by_nutation or self._estimators[self.best]
 
     @property
     def fitted(self) -> Fitted:
         """Return the fit of the most likely disc, after an update."""
-        fitted = self._estimators[self.best].fitted
+        fitted = self._leading.fitted
         assert fitted is not None  # noqa: S101 - for the type checker
         return fitted
 
     @property
     def linear(self) -> Linear:
         """Return the linear fit of the most likely disc, after an update."""
-        linear = self._estimators[self.best].linear
+        linear = self._leading.linear
         assert linear is not None  # noqa: S101 - for the type checker
         return linear
 
@@ -60,12 +74,17 @@ class DiscChoice:
         Args:
             data: All measurements so far, the first at time 0.
             steps: Gauss-Newton steps; the first update makes more.
-            unlikely: Update the unlikely models, too, and the probabilities.
+            unlikely: Update the unlikely models, too, and the probabilities; or weigh spins.
         """
         kept = self._kept
+        weigh = unlikely and float(data.time[-1]) >= self._weighed + _WEIGHING_PERIOD
+        if self._by_nutation is not None and not weigh:
+            return self._by_nutation.update(data, steps)
         for i in kept:
             if unlikely or i < self._likely or i == self.best:
-                self._estimators[i].update(data, steps)
+                # Where the spin is known, other models come near in several updates.
+                more = MOST_MORE if self._by_nutation is None or i == self.best else 1
+                self._estimators[i].update(data, steps, more)
         if len(kept) > 1 and (unlikely or kept[-1] < self._likely):
             evidence = np.array([self._estimators[i].log_evidence for i in kept])
             evidence += self._expected[kept]
@@ -74,7 +93,30 @@ class DiscChoice:
                 self.weights[:] = 0.0
                 self.weights[kept] = probable / probable.sum()
                 self.best = int(np.argmax(self.weights))
+        if weigh:
+            self._by_nutation = self._with_told_spin(data, steps)
         return self.fitted
+
+    def _with_told_spin(self, data: Measurements, steps: int) -> ThrowEstimator | None:
+        """Return an estimate with the spin that the nutation tells, beside the plain one.
+
+        None where it tells nothing, or another model may be right.
+        """
+        self._weighed = float(data.time[-1])
+        plain, other = self._estimators[self.best], self._by_nutation
+        self._belief = plain.spins() if self.weights[self.best] > _CERTAIN else None
+        if self._belief is None or plain.fitted is None:
+            return None
+        spin = self._belief.likeliest
+        if other is not None and other.fitted is not None:
+            off = abs(float(other.fitted.estimate.state[SPIN]) - spin.mean)
+            other = (
+                None if off > _SAME_SPIN else other if off < spin.sigma else other.with_spin(spin)
+            )
+        if other is None:
+            other, steps = plain.with_spin(spin), _FIRST_STEPS
+        worse = other.update(data, steps, 0).cost - plain.fitted.cost
+        return None if other.is_lost or worse > _WORSE else other
 
     @property
     def _kept(self) -> list[int]:
@@ -89,7 +131,9 @@ class DiscChoice:
         """
         landings, weights = [], []
         for i in self._kept:
-            if i < self._likely or i == self.best:
+            if i == self.best:
+                of_one = self._leading.landings(self._belief if self._by_nutation else None)
+            elif i < self._likely:
                 of_one = self._estimators[i].landings()
             else:
                 of_one = self._landing_of(i)

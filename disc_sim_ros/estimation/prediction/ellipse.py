@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.estimation.prediction.nutation import SPIN, SpinBelief
 from disc_sim_ros.estimation.prediction.throw_fit import Estimate, Linear, Model, square_root
 
 DRAWS = 64  # throws; a multiple of 16
@@ -35,7 +36,21 @@ def _draws(unknowns: int) -> FloatArray:
     return draws
 
 
-def drawn_landings(model: Model, estimate: Estimate, linear: Linear, now: float) -> FloatArray:
+@cache
+def _shares() -> FloatArray:
+    """Return shares of a probability, evenly spaced, in an order that is drawn; shape (DRAWS,)."""
+    shares = (np.random.default_rng(1).permutation(DRAWS) + 0.5) / DRAWS
+    shares.flags.writeable = False
+    return shares
+
+
+def drawn_landings(
+    model: Model,
+    estimate: Estimate,
+    linear: Linear,
+    now: float,
+    belief: SpinBelief | None = None,
+) -> FloatArray:
     """Return landings of throws drawn from the linear fit.
 
     Args:
@@ -43,6 +58,7 @@ def drawn_landings(model: Model, estimate: Estimate, linear: Linear, now: float)
         estimate: The estimate.
         linear: The fit close to it.
         now: Time of the newest measurement, since the reference [s].
+        belief: Spins that are likely; None for those of the linear fit.
 
     Returns:
         X, Y [m] and time [s] of those that land, shape (n, 3); empty if too few do.
@@ -50,7 +66,12 @@ def drawn_landings(model: Model, estimate: Estimate, linear: Linear, now: float)
     m = model.unknowns
     offsets = model.offsets
     draws = _draws(m + len(offsets))
-    throws = model.moved(estimate, draws[:, :m] @ square_root(linear.covariance).T)
+    deltas = draws[:, :m] @ square_root(linear.covariance).T
+    if belief is not None:
+        to_spin = linear.covariance[:, model.spin] / linear.covariance[model.spin, model.spin]
+        off = belief.drawn(_shares()) - estimate.state[SPIN]
+        deltas += np.outer(off - deltas[:, model.spin], to_spin)
+    throws = model.moved(estimate, deltas)
     tracker = model.tracker
     so_far = tracker.fly(throws.states, throws.rows, np.array([now]), 0.0)
     rows = throws.rows

@@ -3,13 +3,16 @@
 A batch estimator, because a filter of this problem is overconfident (docs/predictor.md).
 """
 
+from dataclasses import replace
 import math
 
 import numpy as np
 
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import lift_coordinates, local
+from disc_sim_ros.estimation.prediction import nutation
 from disc_sim_ros.estimation.prediction.ellipse import drawn_landings
+from disc_sim_ros.estimation.prediction.prior import Gaussian
 from disc_sim_ros.estimation.prediction.throw_fit import (
     POSITION,
     Estimate,
@@ -27,7 +30,7 @@ FIRST_STEPS = 6  # Gauss-Newton steps of the first update
 # Gain in cost from which another step is made: that of a move of 0.2 standard deviations. One step
 # lags behind the measurements, and more than four cost more time than they gain.
 _FAR = 0.02
-_MOST_MORE = 3
+MOST_MORE = 3
 # Derivatives are differences over one standard deviation, which sees beyond the corners of the
 # table. Where a step along them gains nothing, this share of it shows the slope at the estimate,
 # which may lie very near a corner.
@@ -55,22 +58,22 @@ class ThrowEstimator:
         self._spread = _first_spread(model)
         self._data: Measurements | None = None
 
-    def update(self, data: Measurements, steps: int = 1) -> Fitted:
+    def update(self, data: Measurements, steps: int = 1, more: int = MOST_MORE) -> Fitted:
         """Fit all measurements of the throw.
 
         Args:
             data: All measurements so far, the first at time 0.
-            steps: Gauss-Newton steps, and up to three more while the last led far; the first
-                update makes more.
+            steps: Gauss-Newton steps; the first update makes more.
+            more: Further steps, at most, while the last led far.
         """
         model = self._model
-        if self.fitted is None or self._scale[0] > _LOST or not math.isfinite(self.fitted.cost):
+        if self.fitted is None or self.is_lost:
             estimate, self._spread = first_estimate(model, data), _first_spread(model)
             steps = FIRST_STEPS
         else:
             estimate = self.fitted.estimate
         narrow = False
-        for k in range(1, steps + _MOST_MORE + 1):
+        for k in range(1, steps + more + 1):
             duration = model.duration if k >= steps else 0.0
             spread = _NARROW * self._spread if narrow else self._spread
             self.linear, step, self._scale = linearised(model, estimate, spread, data)
@@ -86,12 +89,47 @@ class ThrowEstimator:
         assert self.fitted is not None  # noqa: S101 - for the type checker
         return self.fitted
 
-    def landings(self) -> FloatArray:
+    def landings(self, belief: nutation.SpinBelief | None = None) -> FloatArray:
         """Return likely landings, see `ellipse.drawn_landings`."""
         if self.fitted is None or self.linear is None or self._data is None:
             return np.empty((0, 3))
         now = float(self._data.time[-1])
-        return drawn_landings(self._model, self.fitted.estimate, self.linear, now)
+        return drawn_landings(self._model, self.fitted.estimate, self.linear, now, belief)
+
+    def spins(self) -> nutation.SpinBelief | None:
+        """Weigh spins by the nutation in the axes; None while too little was measured of them."""
+        fitted, linear, data, model = self.fitted, self.linear, self._data, self._model
+        if fitted is None or linear is None or data is None or not data.has_axis:
+            return None
+        if data.time[-1] < nutation.LEAST_TIME:
+            return None
+        throws = model.moved(fitted.estimate, np.zeros((1, model.unknowns)))
+        tracks = model.tracker.fly(throws.states, throws.rows, data.time, 0.0)
+        state, axes = fitted.estimate.state, tracks.sights[0, :, POSITION:, 0]
+        sigma = math.sqrt(linear.covariance[model.spin, model.spin])
+        plain = Gaussian(float(state[nutation.SPIN]), sigma)
+        scale = float(self._scale[POSITION])
+        return nutation.weighed(model, state, tracks.last[0], plain, data, axes, scale)
+
+    def with_spin(self, spin: Gaussian) -> 'ThrowEstimator':
+        """Return an estimator that knows the spin [rad/s], to be updated from this estimate."""
+        assert self.fitted is not None  # noqa: S101 - for the type checker
+        assert self.linear is not None  # noqa: S101 - for the type checker
+        model, estimate = self._model, self.fitted.estimate
+        along = (
+            self.linear.covariance[:, model.spin] / self.linear.covariance[model.spin, model.spin]
+        )
+        move = (spin.mean - estimate.state[nutation.SPIN]) * along
+        other = ThrowEstimator(model.knowing(spin))
+        other.fitted = replace(self.fitted, estimate=model.moved(estimate, move[None])[0])
+        other.linear, other._spread, other._scale = self.linear, self._spread, self._scale
+        other._data = self._data
+        return other
+
+    @property
+    def is_lost(self) -> bool:
+        """Return True if the estimate is far from the measurements."""
+        return self.fitted is None or not math.isfinite(self.fitted.cost) or self._scale[0] > _LOST
 
     @property
     def log_evidence(self) -> float:

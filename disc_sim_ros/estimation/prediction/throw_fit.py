@@ -6,7 +6,7 @@ between flights one standard deviation to both sides of the estimate, along the 
 covariance: where a table of coefficients has a corner, they are the mean slopes of what is likely.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 
@@ -15,7 +15,7 @@ import numpy as np
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.estimation import lift_coordinates
 from disc_sim_ros.estimation.prediction import lanes
-from disc_sim_ros.estimation.prediction.prior import ThrowPrior
+from disc_sim_ros.estimation.prediction.prior import Gaussian, ThrowPrior
 from disc_sim_ros.physics.flight import Setup
 from disc_sim_ros.physics.kernels.equations import State
 from disc_sim_ros.physics.kernels.rows import AT
@@ -131,6 +131,18 @@ class Model:
         """
         without = {'p', 'q'} if self.setup.has_no_nutation else set()
         return [i for i, name in enumerate(lift_coordinates.NAMES) if name not in without]
+
+    @cached_property
+    def spin(self) -> int:
+        """Return the place of the spin among the unknowns."""
+        return self.coordinates.index(lift_coordinates.NAMES.index('r'))
+
+    def knowing(self, spin: Gaussian) -> 'Model':
+        """Return the model of a throw with this spin; it flies with what this one has computed."""
+        other = replace(self, prior=replace(self.prior, spin=spin))
+        computed = {name: value for name, value in vars(self).items() if name not in vars(other)}
+        vars(other).update(computed)
+        return other
 
     @cached_property
     def curve(self) -> lanes.Curve:
