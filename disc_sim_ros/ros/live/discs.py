@@ -58,6 +58,7 @@ class LiveDisc:
         self._last: tuple[float, ...] = ()
         self._stamp = 0
         self._angle = 0.0
+        self._newest: int | None = None  # stamp of the last odometry [ns]
 
     def about(self) -> dict[str, Any]:
         """Return what the page shows once for each flight of this disc."""
@@ -84,8 +85,12 @@ class LiveDisc:
             return None
         self.frame, self.child_frame = message.header.frame_id, message.child_frame_id
         stamp = _nanoseconds(message)
-        if self._start is None or stamp < self._start:  # no release is known, or time was set back
+        was_set_back = self._newest is not None and stamp < self._newest
+        self._newest = stamp
+        if self._start is None or (was_set_back and stamp < self._start):  # no release is known
             self._begin(stamp)
+        elif stamp < self._start:
+            return None  # from before the release, which was taken first
         elif self._last:
             rate = (self._last[12] + numbers[12]) / 2.0
             self._angle += rate * (stamp - self._stamp) / NANOSECONDS

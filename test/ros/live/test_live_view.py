@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
+pytest.importorskip('trimesh')
 pytest.importorskip('websockets.asyncio')
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -25,15 +27,15 @@ import browser
 from disc_sim_ros import Launch, Setup, fly, load_disc, topics
 from disc_sim_ros.errors import ConfigError, DiscSimError
 from disc_sim_ros.physics import frames
+from disc_sim_ros.ros import qos
 from disc_sim_ros.ros.live import discs
 from disc_sim_ros.ros.live.node import SENT
 from disc_sim_ros.ros.live.options import live_config
 from disc_sim_ros.ros.live.server import LiveServer
+from disc_sim_ros.units import METRIC
 from forked import start
-import installed
 from ros.sim_process import DEADLINE
 
-installed.need('trimesh')
 pytestmark = pytest.mark.ros
 PAGE = b'<!DOCTYPE html><title>x</title>'
 THROW = {'speed': 12.0, 'pitch': 10.0, 'spin': 40.0, 'height': 1.0}
@@ -227,6 +229,49 @@ def throw_when_ready(viewer, token: str) -> None:
         time.sleep(0.1)
 
 
+def test_odometry_from_before_a_release_that_was_taken_first_begins_no_flight(ros):
+    """It was taken for time that was set back, and the flight ran ahead by as much."""
+    disc = discs.LiveDisc(ros.node, '')
+    latched = qos.LATCHED_QOS
+    releases = ros.node.create_publisher(Odometry, topics.RELEASE, latched)
+    odometry = ros.node.create_publisher(Odometry, topics.ODOM, 10)
+
+    def sent(publisher, milliseconds: int):
+        message = Odometry()
+        message.header.stamp.sec = 10
+        message.header.stamp.nanosec = milliseconds * 1_000_000
+        message.pose.pose.position.x = 1e-3 * milliseconds
+        message.pose.pose.orientation.w = 1.0
+        publisher.publish(message)
+
+    def state_with(milliseconds: int):
+        """Return the time of the state that this odometry gives; it may take until it is known."""
+        end = time.monotonic() + DEADLINE
+        while time.monotonic() < end:
+            sent(odometry, milliseconds)
+            if (state := disc.update(METRIC)) is not None:
+                return state['t']
+            time.sleep(0.01)
+        return None
+
+    assert state_with(100) == 0.0  # no release is known: the first one begins the flight
+    sent(releases, 500)
+    end = time.monotonic() + DEADLINE
+    while disc.about()['flight'] < 2:
+        assert time.monotonic() < end
+        disc.update(METRIC)
+        time.sleep(0.01)
+    for late in (400, 450):
+        sent(odometry, late)
+        for _ in range(20):
+            assert disc.update(METRIC) is None
+            time.sleep(0.005)
+    assert state_with(700) == pytest.approx(0.2)
+    assert disc.about()['flight'] == 2
+    assert state_with(300) == 0.0  # time was set back
+    assert disc.about()['flight'] == 3
+
+
 def test_the_states_are_those_of_the_flight(ros, live):
     sim = ros.start({'auto_throw': False})
     _, address = live
@@ -243,9 +288,11 @@ def test_the_states_are_those_of_the_flight(ros, live):
         prediction.pose.pose.position.x = 17.0
         landings = ros.publisher(PoseWithCovarianceStamped, topics.PredictorTopic.LANDING)
 
+        landing_time = expected.time - 5e-5  # s; times have four places
+
         def landed(s):
             landings.publish(prediction)  # each time: the subscriber may know the publisher late
-            return s[-1]['t'] >= expected.time - 1e-3
+            return s[-1]['t'] >= landing_time
 
         flown = states(viewer, landed)
     assert sim.process.poll() is None
@@ -256,7 +303,7 @@ def test_the_states_are_those_of_the_flight(ros, live):
     assert (last['name'], last['diameter'], last['wind']) == ('frisbee', 0.275, None)
     # The last state is the first one after the landing: a period of 1/30 s later, if the machine
     # is in time. A disc at rest gives no further states.
-    assert expected.time <= times[-1] < expected.time + 1.0
+    assert landing_time <= times[-1] < expected.time + 1.0
     assert flown[-1]['position'][:2] == pytest.approx(expected.position[:2], abs=0.05)
     turned = flown[-2]['spin'] - flown[0]['spin']
     # Clockwise from above is negative about z up; the spin falls by a few percent from 40 rad/s.
