@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 import math
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from disc_sim_ros.analysis.flights import velocities
 from disc_sim_ros.analysis.odometry import Motion, usable
-from disc_sim_ros.analysis.rotations import rotated, rotated_back, turns_between
 from disc_sim_ros.arrays import FloatArray
 from disc_sim_ros.units import NANOSECONDS
 
@@ -142,7 +142,8 @@ def _twist_check(motion: Motion) -> Check:
 
 def rotate(motion: Motion) -> FloatArray:
     """Return the velocities of Odometry in `frame` [m/s], shape (n, 3)."""
-    return rotated(_quaternions(motion), motion.numbers[:, 7:10])
+    velocity: FloatArray = _rotation(motion).apply(motion.numbers[:, 7:10])
+    return velocity
 
 
 def with_twist(motion: Motion) -> Motion:
@@ -155,12 +156,12 @@ def with_twist(motion: Motion) -> Motion:
     motion = _oriented(motion)
     if motion.has_twist:
         return motion
-    quaternions = _quaternions(motion)
-    linear = rotated_back(quaternions, velocities(motion))
+    rotation = _rotation(motion)
+    linear = rotation.apply(velocities(motion), inverse=True)
     angular = np.zeros((len(motion), 3))
     if len(motion) > 1:
         dt = np.maximum(np.diff(motion.stamps), 1)[:, None] / NANOSECONDS
-        angular[:-1] = turns_between(quaternions) / dt
+        angular[:-1] = (rotation[:-1].inv() * rotation[1:]).as_rotvec() / dt
         angular[-1] = angular[-2]
     numbers = np.hstack([motion.numbers, linear, angular])
     return replace(motion, numbers=numbers)
@@ -191,7 +192,8 @@ def turns_with_spin(motion: Motion) -> bool:
     rate = float(np.median(motion.numbers[:, 12]))
     if dt <= 0.0 or abs(rate * dt) > math.pi or abs(rate) < 1.0:
         return False
-    of_frame = float(np.median(turns_between(_quaternions(motion))[:, 2])) / dt
+    rotation = _rotation(motion)
+    of_frame = float(np.median((rotation[:-1].inv() * rotation[1:]).as_rotvec()[:, 2])) / dt
     return abs(of_frame - rate) < abs(of_frame)
 
 
@@ -209,7 +211,6 @@ def _oriented(motion: Motion) -> Motion:
     return replace(motion, numbers=numbers)
 
 
-def _quaternions(motion: Motion) -> FloatArray:
-    """Return the attitudes, with no turn where a message has none, shape (n, 4)."""
+def _rotation(motion: Motion) -> Rotation:
     good = usable(motion.quaternion)[:, None]
-    return np.where(good, motion.quaternion, NO_TURN)
+    return Rotation.from_quat(np.where(good, motion.quaternion, NO_TURN))

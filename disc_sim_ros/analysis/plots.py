@@ -16,7 +16,7 @@ from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.plot_axes import label
 from disc_sim_ros.units import METRIC, System
 
-if TYPE_CHECKING:  # the analysis of bags reads them, which the plot of `fly` does without
+if TYPE_CHECKING:  # the analysis of bags imports scipy, which the plot of `fly` does without
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes

@@ -70,7 +70,7 @@ def recorded(analysis: 'Analysis', system: 'System') -> 'ShownFlight':
     Raises:
         DiscSimError: None of its messages has a position.
     """
-    from disc_sim_ros.analysis import bag_report  # noqa: PLC0415 - for pages of bags alone
+    from disc_sim_ros.analysis import bag_report  # noqa: PLC0415 - scipy takes half a second
     from disc_sim_ros.view import shown  # noqa: PLC0415
 
     known = bag_report.document(analysis)

@@ -44,8 +44,8 @@ _IMPORT = {'importlib._bootstrap', '_frozen_importlib'}  # the module of the imp
 def _interrupt(_: int, frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt; within an import, look again a little later.
 
-    Packages that import what they may do without catch every exception, such as numba: Ctrl-C was
-    lost there.
+    Packages that import what they may do without catch every exception, such as trimesh and numba:
+    Ctrl-C was lost there.
     """
     while frame is not None:
         if frame.f_globals.get('__name__') in _IMPORT:

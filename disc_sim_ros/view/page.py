@@ -1,25 +1,21 @@
 """The page: the viewer of trimesh with three.js, our controls, and the flights, in one file."""
 
-import base64
 from collections.abc import Sequence
 from html import escape
-from importlib import metadata, resources
-from importlib.util import find_spec
+from importlib import resources
 import json
-from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
 
 from disc_sim_ros.errors import DiscSimError, printable
 from disc_sim_ros.palette import COLOURS
 from disc_sim_ros.quantities import LAUNCH
+from disc_sim_ros.threads import ctrl_c_waits
 from disc_sim_ros.units import System
-from disc_sim_ros.view import predicted, shape
+from disc_sim_ros.view import predicted
 from disc_sim_ros.view.shown import MOST_SAMPLES, ShownFlight, curve_labels, document
 
 TRIMESH = (5, 6)  # from and below: the page uses names of its viewer that are not promised
 MOST_SAMPLES_OF_PAGE = 24_000  # of all flights together: 5 MB
-_OTHER_FORM = 'the page of trimesh has another form than expected'
 # Forbids every request: the page works from a file, and nothing in it can ask a host.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -106,25 +102,21 @@ def live_page(system: System) -> bytes:
 def viewer() -> str:
     """Return the page of trimesh with its three.js and the shape of a disc of diameter 1.
 
-    The page is read from the folder of trimesh: its import would take half a second, most of it
-    for parts of scipy.
-
     Raises:
         ViewerMissingError: trimesh is missing or has the wrong version.
     """
     wanted = f'trimesh {TRIMESH[0]} (pip install "trimesh>={TRIMESH[0]},<{TRIMESH[1]}")'
-    package = find_spec('trimesh')
-    if package is None or package.origin is None:
-        raise ViewerMissingError(f'a page needs {wanted}')
-    version = metadata.version('trimesh')
-    if not TRIMESH[0] <= int(version.partition('.')[0]) < TRIMESH[1]:
-        raise ViewerMissingError(f'a page needs {wanted}, not {version}')
-    try:
-        with ZipFile(Path(package.origin).parent / 'resources/templates/viewer.zip') as packed:
-            template = packed.read('viewer.html.template').decode()
-    except (OSError, KeyError):
-        raise ViewerMissingError(_OTHER_FORM) from None
-    return template.replace('$B64GLTF', base64.b64encode(shape.glb()).decode())
+    with ctrl_c_waits():  # trimesh takes KeyboardInterrupt for a missing or unsuitable part
+        try:
+            import trimesh  # noqa: PLC0415 - optional
+            from trimesh.viewer.notebook import scene_to_html  # noqa: PLC0415
+
+            from disc_sim_ros.view import shape  # noqa: PLC0415 - imports trimesh
+        except ImportError as error:
+            raise ViewerMissingError(f'a page needs {wanted}: {error}') from None
+        if not TRIMESH[0] <= int(str(trimesh.__version__).partition('.')[0]) < TRIMESH[1]:
+            raise ViewerMissingError(f'a page needs {wanted}, not {trimesh.__version__}')
+        return str(scene_to_html(shape.scene()))
 
 
 def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
@@ -143,7 +135,7 @@ def assembled(viewer_page: str, title: str, values: dict[str, Any]) -> str:
     start, _, rest = viewer_page.partition('<title>')
     _, title_end, rest = rest.partition('</title>')
     if not title_end or rest.count('</head>') != 1 or not rest.count('</body>'):
-        raise ViewerMissingError(_OTHER_FORM)
+        raise ViewerMissingError('the page of trimesh has another form than expected')
     rest = rest.replace('</head>', head, 1)
     before, _, after = rest.rpartition('</body>')
     return before.join((start, body)) + after

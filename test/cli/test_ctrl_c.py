@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from disc_sim_ros.cli import fly
+
 BIN = Path(sys.executable).parent
 ENDED = {130, -signal.SIGINT}  # both are 130 to a shell
 TRIES = 5
@@ -38,12 +40,14 @@ def program(tmp_path) -> Path:
     return path
 
 
-def interrupted(command, delay, folder, *, ready='') -> tuple[int, str]:
+def interrupted(
+    command, delay, folder, *, ready='', library='/numpy/', made=()
+) -> tuple[int, str]:
     """Send SIGINT to a program and its workers, `delay` s after its first line.
 
-    Without `ready`, after it has loaded a library of numpy: before, Python itself may still start,
-    which has tracebacks of its own. While this test waits for a core the program may end: it is
-    started again.
+    Without `ready`, after it has loaded a library: before numpy, Python itself may still start,
+    which has tracebacks of its own. While this test waits for a core the program may end, or make
+    its files and then end by the signal: it is started again without them.
     """
     for _ in range(TRIES):
         process = subprocess.Popen(
@@ -53,15 +57,18 @@ def interrupted(command, delay, folder, *, ready='') -> tuple[int, str]:
         if ready:
             assert ready in process.stdout.readline()
         maps = Path(f'/proc/{process.pid}/maps')
-        while not ready and process.poll() is None and '/numpy/' not in maps.read_text():
+        while not ready and process.poll() is None and library not in maps.read_text():
             time.sleep(0.003)  # to read it takes a third of that
         time.sleep(delay)
         late = process.poll() is not None
         if not late:
             os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
         _, error = process.communicate(timeout=120)
+        late |= process.returncode in ENDED and any(path.exists() for path in made)
         if not late:
             return process.returncode, error
+        for path in made:
+            path.unlink(missing_ok=True)
     raise AssertionError(f'{command} was done {TRIES} times before it was interrupted: {error}')
 
 
@@ -138,36 +145,14 @@ def test_paper_figures_ends_without_a_traceback_while_its_workers_start(tmp_path
     assert code in ENDED
 
 
-def test_ctrl_c_is_not_lost_in_an_import(tmp_path):
-    """Packages that import what they may do without catch every exception, as trimesh does.
-
-    `fly --html` went on there and wrote the page.
-    """
-    (tmp_path / 'careless.py').write_text(
-        "import time\nprint('ready', flush=True)\n"
-        'try:\n    time.sleep(0.5)\nexcept BaseException:\n    missing = True\n',
-        encoding='utf-8',
-    )
-    path = tmp_path / 'program.py'
-    path.write_text(
-        """
-import sys, time
-from disc_sim_ros.cli import start
-
-def main():
-    import careless
-    time.sleep(1.0)
-    print('went on')
-    return 0
-
-sys.exit(start.run(lambda: main))
-""",
-        encoding='utf-8',
-    )
-    process = subprocess.Popen(
-        [sys.executable, path], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout.readline() == 'ready\n'
-    process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=120) == ('', '')
-    assert process.returncode in ENDED
+# Interrupted while trimesh imports what it may do without, it went on and wrote the page.
+@pytest.mark.parametrize('name', ['fly', 'analyse_bag'])
+def test_ctrl_c_is_not_lost_in_an_import(name, tmp_path):
+    words = {'fly': ['--html', 'a.html'], 'analyse_bag': ['bag', '--html', 'a.html']}
+    if name == 'analyse_bag':
+        assert fly.main(['--bag', str(tmp_path / 'bag'), '--duration', '0.5']) == 0
+    page, command = tmp_path / 'a.html', [BIN / name, *words[name]]
+    code, error = interrupted(command, 0.0, tmp_path, library='/_nd_image', made=[page])
+    assert error == ''
+    assert code in ENDED
+    assert not page.exists()

@@ -13,8 +13,6 @@ import time
 
 import pytest
 
-import installed
-
 rclpy = pytest.importorskip('rclpy')
 
 from disc_sim_ros.ros.processes import started  # noqa: E402 - needs rclpy
@@ -91,7 +89,7 @@ def test_the_recorder_opens_what_its_policy_allows(ros, tmp_path):
 
 
 def test_live_view_opens_what_its_policy_allows_and_nothing_else(ros, tmp_path):
-    installed.need('trimesh')
+    pytest.importorskip('trimesh')
     pytest.importorskip('websockets.asyncio')
     policy = read_policy('live_view')
     ros.start({'auto_throw': False})

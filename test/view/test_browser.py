@@ -18,9 +18,8 @@ from disc_sim_ros.physics import frames
 from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import shown
 from disc_sim_ros.view.page import page
-import installed
 
-installed.need('trimesh')
+pytest.importorskip('trimesh')
 pytestmark = [
     pytest.mark.skipif(browser.program() is None, reason=browser.MISSING),
     pytest.mark.xdist_group('browser'),

@@ -11,10 +11,9 @@ from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup, fly
 from disc_sim_ros.physics.frames import map_from_paper
 from disc_sim_ros.physics.launch import Launch
-import installed
 from view.test_browser import SIZES, poses, shown_at
 
-installed.need('trimesh')
+pytest.importorskip('trimesh')
 pytestmark = [
     pytest.mark.skipif(browser.program() is None, reason=browser.MISSING),
     pytest.mark.xdist_group('browser'),  # identified once

@@ -18,11 +18,10 @@ from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import predicted, shown
 from disc_sim_ros.view.page import page
 from estimation.synthetic_throws import throw
-import installed
 from view.test_browser import SIZES, TWO_FRAMES, picture, shown_at
 from view.test_page import data_of
 
-installed.need('trimesh')
+pytest.importorskip('trimesh')
 pytestmark = pytest.mark.xdist_group('browser')  # followed once
 METRIC, US = SYSTEMS['metric'], SYSTEMS['us']
 CONFIG = PredictorConfig(setup=Setup(disc=load_disc('ultrastar')))

@@ -11,10 +11,9 @@ from disc_sim_ros.cli import analyse_bag
 from disc_sim_ros.physics.trajectory import Trajectory
 from disc_sim_ros.units import SYSTEMS
 from disc_sim_ros.view import shown
-import installed
 from view.test_page import data_of
 
-installed.need('trimesh')
+pytest.importorskip('trimesh')
 BAG = Path(__file__).parents[1] / 'data/recorded_by_0_1_0'
 KNOWN = {'landed': True, 'wind_is_known': True, 'turns_with_spin': False}
 
