@@ -109,3 +109,13 @@ def test_too_few_axes_tell_nothing():
     data = measured(t, FINE_AXIS)
     estimator.update(replace(data, axis=np.full_like(data.axis, np.nan)))
     assert estimator.spins() is None
+
+
+def test_a_spin_with_which_no_flight_goes_on_is_lost_without_a_warning():
+    (model,) = PredictorConfig(setup=SETUP).models
+    t = throw(SETUP, WOBBLY, 0)
+    plain = ThrowEstimator(model)
+    plain.update(measured(t, FINE_AXIS))
+    lost = plain.with_spin(Gaussian(1e9, 1.0))
+    assert lost.update(measured(t, FINE_AXIS), 2, 0).gain == 0.0
+    assert lost.is_lost

@@ -383,5 +383,5 @@ def best_on_line(
         tracks.landing[i],
         tracks.last[i],
         float(cost[i]),
-        float(cost[-1] - cost[i]),
+        float(cost[-1] - cost[i]) if math.isfinite(cost[i]) else 0.0,
     )
