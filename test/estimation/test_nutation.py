@@ -119,3 +119,17 @@ def test_a_spin_with_which_no_flight_goes_on_is_lost_without_a_warning():
     lost = plain.with_spin(Gaussian(1e9, 1.0))
     assert lost.update(measured(t, FINE_AXIS), 2, 0).gain == 0.0
     assert lost.is_lost
+
+
+@pytest.mark.parametrize('spin', [Gaussian(0.0, 0.1), Gaussian(0.0, 1000.0)])
+def test_spins_of_any_prior_are_weighed(spin: Gaussian):
+    """A disc that hardly spins does not nutate; of a prior of 1,000 rad/s no more are weighed."""
+    prior = replace(WOBBLY, spin=spin)
+    (model,) = PredictorConfig(setup=SETUP, prior=prior).models
+    t = throw(SETUP, WOBBLY, 0)
+    slow = np.array([*t.state[: nutation.SPIN], spin.mean, 0.0])
+    data = measured(t, FINE_AXIS)
+    plain = Gaussian(spin.mean, spin.sigma)
+    assert nutation.weighed(model, slow, slow, plain, data, data.axis, 1.0) is None
+    belief = nutation.weighed(model, t.state, t.state, spin, data, data.axis, 1.0)
+    assert belief is None or len(belief.spins) < 1000

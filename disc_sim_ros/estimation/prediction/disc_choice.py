@@ -104,7 +104,8 @@ class DiscChoice:
         """
         self._weighed = float(data.time[-1])
         plain, other = self._estimators[self.best], self._by_nutation
-        self._belief = plain.spins() if self.weights[self.best] > _CERTAIN else None
+        certain = self.weights[self.best] > _CERTAIN and not plain.is_lost
+        self._belief = plain.spins() if certain else None
         if self._belief is None or plain.fitted is None:
             return None
         spin = self._belief.likeliest

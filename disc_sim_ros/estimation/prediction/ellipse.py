@@ -68,9 +68,8 @@ def drawn_landings(
     draws = _draws(m + len(offsets))
     deltas = draws[:, :m] @ square_root(linear.covariance).T
     if belief is not None:
-        to_spin = linear.covariance[:, model.spin] / linear.covariance[model.spin, model.spin]
         off = belief.drawn(_shares()) - estimate.state[SPIN]
-        deltas += np.outer(off - deltas[:, model.spin], to_spin)
+        deltas += np.outer(off - deltas[:, model.spin], linear.along(model.spin))
     throws = model.moved(estimate, deltas)
     tracker = model.tracker
     so_far = tracker.fly(throws.states, throws.rows, np.array([now]), 0.0)

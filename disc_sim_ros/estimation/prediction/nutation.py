@@ -19,7 +19,8 @@ from disc_sim_ros.physics.kernels.equations import State
 
 LEAST_TIME = 0.3  # s of measurements, from which spins are weighed
 _STEP = 0.5  # rad/s between spins
-_REACH = 4.0  # standard deviations of the spin to both sides
+_REACH, _FARTHEST = 4.0, 100.0  # to both sides: standard deviations of the spin, and rad/s
+_SLOWEST = 5.0  # rad/s; a slower disc goes round less than once before its nutation is gone
 _PEAK = 2.0  # rad/s to both sides of the likeliest spin that tell how exactly it is known
 _LEAST_SIGMA = 0.3  # rad/s
 _SLOW = 4  # powers of the time, from 0 on, that axes may be off by without a nutation
@@ -61,7 +62,7 @@ def weighed(
     data: Measurements,
     axes: FloatArray,
     scale: float,
-) -> SpinBelief:
+) -> SpinBelief | None:
     """Weigh the spins of a throw by the nutation that is left in the measured axes.
 
     For each spin the nutation is a decaying turn of known rate with two unknown amplitudes, of
@@ -75,10 +76,15 @@ def weighed(
         data: The measurements, some with axes.
         axes: Axes of the fit at their times, shape (k, 3).
         scale: Of the residuals of axes.
+
+    Returns:
+        The belief; None of a disc that hardly spins. The other way round is another model.
     """
-    reach = _REACH * plain.sigma
+    if not abs(plain.mean) > _SLOWEST:
+        return None
+    reach = min(_REACH * plain.sigma, _FARTHEST)
     spins = np.arange(plain.mean - reach, plain.mean + reach + _STEP, _STEP)
-    spins = spins[np.abs(spins) > 1.0]
+    spins = spins[spins * math.copysign(1.0, plain.mean) > _SLOWEST]
     known = data.per_sigma[:, 3] > 0.0
     time = data.time[known]
     per_sigma = data.per_sigma[known, 3] / scale

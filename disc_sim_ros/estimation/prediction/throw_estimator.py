@@ -116,10 +116,7 @@ class ThrowEstimator:
         assert self.fitted is not None  # noqa: S101 - for the type checker
         assert self.linear is not None  # noqa: S101 - for the type checker
         model, estimate = self._model, self.fitted.estimate
-        along = (
-            self.linear.covariance[:, model.spin] / self.linear.covariance[model.spin, model.spin]
-        )
-        move = (spin.mean - estimate.state[nutation.SPIN]) * along
+        move = (spin.mean - estimate.state[nutation.SPIN]) * self.linear.along(model.spin)
         other = ThrowEstimator(model.knowing(spin))
         other.fitted = replace(self.fitted, estimate=model.moved(estimate, move[None])[0])
         other.linear, other._spread, other._scale = self.linear, self._spread, self._scale

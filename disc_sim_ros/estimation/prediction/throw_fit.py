@@ -246,6 +246,11 @@ class Linear:
     landing: FloatArray
     now: FloatArray
 
+    def along(self, k: int) -> FloatArray:
+        """Return how all unknowns change with the one at place k, if it changes by 1."""
+        moves: FloatArray = self.covariance[:, k] / self.covariance[k, k]
+        return moves
+
 
 def costs(tracks: Tracks, throws: Throws, data: Measurements, scale: FloatArray) -> FloatArray:
     """Return half the sum of squared residuals of n throws, shape (n,); outliers count less."""
