@@ -12,7 +12,7 @@ from disc_sim_ros.estimation.prediction.predictor import (
     Predictor,
     PredictorConfig,
 )
-from disc_sim_ros.estimation.prediction.prior import ThrowPrior, disc_offsets
+from disc_sim_ros.estimation.prediction.prior import Gaussian, ThrowPrior, disc_offsets
 from disc_sim_ros.estimation.prediction.replay import replay
 from disc_sim_ros.physics.disc_file import load_disc
 from disc_sim_ros.physics.flight import Setup
@@ -342,6 +342,14 @@ def test_uncertain_disc_widens_the_ellipse(throws):
         ratios.append(np.trace(unknown[:2, :2]) / np.trace(known[:2, :2]))
     # Of one throw it may be narrower: the spin that its nutation seems to have is another one.
     assert np.median(ratios) > 1.5
+
+
+def test_a_disc_that_hardly_spins_is_followed():
+    """Precession divides by the spin; a warning of numpy is an error here."""
+    prior = replace(PRIOR, spin=Gaussian(0.0, 1.0))
+    t = throw(SETUP, replace(PRIOR, spin=Gaussian(0.0, 2.0)), 4)
+    config = PredictorConfig(setup=SETUP, prior=prior)
+    assert np.isfinite(follow(t.measurements(axis=True), math.inf, config).covariance).all()
 
 
 def test_memory_of_a_throw_is_bounded(throws):

@@ -136,6 +136,8 @@ class ThrowEstimator:
         """
         if self.fitted is None or self.linear is None or self._data is None:
             return -math.inf
+        if not np.isfinite(self.linear.covariance).all():  # a spin about 0 has no precession
+            return -math.inf
         _, volume = np.linalg.slogdet(self.linear.covariance)
         measured = np.count_nonzero(self._data.per_sigma, axis=0)
         scales = float(measured @ np.log(self._scale) + np.sum(np.log(self._model.sigmas)))
