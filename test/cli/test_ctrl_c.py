@@ -1,158 +1,209 @@
-"""Ctrl-C at many moments: exit code 130 and no traceback, also while workers start."""
+"""Ctrl-C at many points: exit code 130 and no traceback, also while workers start.
+
+The program itself sends it, when it comes to a point: a time would be another point on a machine
+under load. As from a terminal, it goes to the program and to its workers.
+"""
 
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
-from disc_sim_ros.cli import fly
-
 BIN = Path(sys.executable).parent
+EXECUTORS = 'disc_sim_ros.studies.executors'  # what a worker imports first
 ENDED = {130, -signal.SIGINT}  # both are 130 to a shell
-TRIES = 5
+
+# Sends Ctrl-C in the import of a module: that of the program, or of one of its workers.
+AT_IMPORT = """
+import os, signal, sys
+
+class Point:
+    def find_spec(self, name, *_):
+        if name == {name!r} and (os.getpid() == os.getsid(0)) == {program}:
+            sys.meta_path.remove(self)
+            if {program} or not os.path.exists('sent'):
+                open('sent', 'w').close()
+                os.killpg(0, signal.SIGINT)
+
+sys.meta_path.insert(0, Point())
+"""
 WORKERS = """
-import sys, time
+import os, signal, sys
+from multiprocessing import util
 from disc_sim_ros.cli import start
+
+def send():
+    {send}
+
+def send_once():
+    if not os.path.exists('sent'):
+        open('sent', 'w').close()
+        send()
+
+def spawned(*what, spawn=util.spawnv_passfds, count=[]):
+    pid = spawn(*what)
+    count.append(pid)
+    if len(count) == {spawned}:
+        send()
+    return pid
+
+util.spawnv_passfds = spawned
 
 def main():
     from disc_sim_ros.studies import executors
     print('ready', flush=True)
-    with executors.processes(3) as pool:
-        for future in [pool.submit(time.sleep, 0.01 * k) for k in range(6)]:
+    {before}
+    with executors.processes(2) as pool:
+        for future in [pool.submit({task}) for _ in range(4)]:
             future.result()
     print('done', flush=True)
     return 0
 
 if __name__ == '__main__':
     sys.exit(start.run(lambda: main))
+{at_import}
 """
+PLAIN = {'send': 'os.killpg(0, 2)', 'spawned': 0, 'before': '', 'task': 'int', 'at_import': ''}
+# The points in the time of the program: the tracker of semaphores, which is started first, or a
+# worker has been spawned; a worker imports the program; it does its first task.
+POINTS = {
+    'tracker': {'spawned': 1},
+    'first worker': {'spawned': 2},
+    'second worker': {'spawned': 3},
+    'import': {'at_import': 'send_once()'},
+    'task': {'task': 'send_once'},
+}
 
 
 @pytest.fixture
-def program(tmp_path) -> Path:
-    """A program that starts three workers as `sweep` and `paper_figures` do."""
-    path = tmp_path / 'workers.py'
-    path.write_text(WORKERS, encoding='utf-8')
-    return path
+def workers(tmp_path, monkeypatch):
+    """Return a function that runs a program which starts two workers, as `sweep` does."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(**changes: object) -> subprocess.CompletedProcess[str]:
+        path = tmp_path / 'workers.py'
+        path.write_text(WORKERS.format(**(PLAIN | changes)), encoding='utf-8')
+        return ended([sys.executable, path])
+
+    return run
 
 
-def interrupted(
-    command, delay, folder, *, ready='', library='/numpy/', made=()
-) -> tuple[int, str]:
-    """Send SIGINT to a program and its workers, `delay` s after its first line.
+def ended(command, environment=os.environ) -> subprocess.CompletedProcess[str]:
+    """Run a program in a process group of its own to its end."""
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=120, env=environment,
+        start_new_session=True,
+    )  # fmt: skip
 
-    Without `ready`, after it has loaded a library: before numpy, Python itself may still start,
-    which has tracebacks of its own. While this test waits for a core the program may end, or make
-    its files and then end by the signal: it is started again without them.
+
+def interrupted(folder: Path, module: str, *command, worker=False) -> tuple[int, str]:
+    """Run a program that is interrupted while it, or a worker of it, imports a module.
+
+    Before the program begins, Python itself may still start, which has tracebacks of its own.
     """
-    for _ in range(TRIES):
-        process = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            start_new_session=True,
-        )  # fmt: skip
-        if ready:
-            assert ready in process.stdout.readline()
-        maps = Path(f'/proc/{process.pid}/maps')
-        while not ready and process.poll() is None and library not in maps.read_text():
-            time.sleep(0.003)  # to read it takes a third of that
-        time.sleep(delay)
-        late = process.poll() is not None
-        if not late:
-            os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
-        _, error = process.communicate(timeout=120)
-        late |= process.returncode in ENDED and any(path.exists() for path in made)
-        if not late:
-            return process.returncode, error
-        for path in made:
-            path.unlink(missing_ok=True)
-    raise AssertionError(f'{command} was done {TRIES} times before it was interrupted: {error}')
+    text = AT_IMPORT.format(name=module, program=not worker)
+    (folder / 'sitecustomize.py').write_text(text, encoding='utf-8')
+    done = ended(command, os.environ | {'PYTHONPATH': str(folder)})
+    assert (folder / 'sent').exists(), f'it does not import {module}'
+    return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize('delay', [k / 1000 for k in (0, 5, 12, 22, 33, 45)])
-def test_no_worker_shows_a_traceback_while_it_starts(program, tmp_path, delay):
-    code, error = interrupted([sys.executable, program], delay, tmp_path, ready='ready')
-    assert error == ''
-    assert code in ENDED
-
-
-@pytest.mark.parametrize('delay', [0.1, 0.102, 0.104, 0.106])
-def test_ctrl_c_in_an_import_waits_also_for_workers_that_start_after_it(tmp_path, delay):
-    (tmp_path / 'slow.py').write_text('import time; time.sleep(0.3)', encoding='utf-8')
-    path = tmp_path / 'workers.py'
-    path.write_text(
-        WORKERS.replace("ready', flush=True)", "ready', flush=True)\n    import slow"),
-        encoding='utf-8',
-    )
-    code, error = interrupted([sys.executable, path], delay, tmp_path, ready='ready')
-    assert error == ''
-    assert code in ENDED
-
-
-def test_ctrl_c_while_the_executor_is_made_leaves_no_semaphore(program, tmp_path):
-    """multiprocessing would remove it in the end, and warn on stderr."""
-    path = tmp_path / 'semaphores.py'
-    path.write_text(
-        """
-from multiprocessing import resource_tracker
-import signal
-
-register = resource_tracker.register
-
-def interrupted(*what):
-    register(*what)
-    signal.raise_signal(signal.SIGINT)
-
-resource_tracker.register = interrupted
-"""
-        + program.read_text(encoding='utf-8'),
-        encoding='utf-8',
-    )
-    done = subprocess.run([sys.executable, path], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize('point', POINTS)
+def test_no_worker_shows_a_traceback_while_it_starts(workers, point):
+    done = workers(**POINTS[point])
     assert (done.stdout, done.stderr) == ('ready\n', '')
     assert done.returncode in ENDED
 
 
-def test_the_program_ends_as_usual_without_ctrl_c(program):
-    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ('ready\ndone\n', '')
+@pytest.mark.parametrize('point', ['tracker', 'second worker'])
+def test_ctrl_c_in_an_import_waits_also_for_workers_that_start_after_it(workers, tmp_path, point):
+    """The program looks again by SIGALRM; here that comes when the import has ended."""
+    (tmp_path / 'slow.py').write_text(
+        'import signal\n'
+        'signal.raise_signal(signal.SIGINT)\n'
+        'assert signal.setitimer(signal.ITIMER_REAL, 0.0)[0] > 0.0\n',
+        encoding='utf-8',
+    )
+    done = workers(
+        before='import slow', send='signal.raise_signal(signal.SIGALRM)', **POINTS[point]
+    )
+    assert (done.stdout, done.stderr) == ('ready\n', '')
+    assert done.returncode in ENDED
+
+
+def test_ctrl_c_while_the_executor_is_made_leaves_no_semaphore(workers):
+    """multiprocessing would remove it in the end, and warn on stderr."""
+    done = workers(
+        before="""
+    from multiprocessing import resource_tracker
+    register = resource_tracker.register
+    def interrupted(*what):
+        register(*what)
+        signal.raise_signal(signal.SIGINT)
+    resource_tracker.register = interrupted
+"""
+    )
+    assert (done.stdout, done.stderr) == ('ready\n', '')
+    assert done.returncode in ENDED
+
+
+def test_the_program_ends_as_usual_without_ctrl_c(workers):
+    done = workers()
+    assert (done.stdout, done.stderr, done.returncode) == ('ready\ndone\n', '', 0)
 
 
 @pytest.mark.parametrize(
-    ('command', 'delay'),
+    ('module', 'command'),
     [
-        (['fly', '--no-ground', '--duration', '3600'], 0.0),
-        (['sweep', '--scatter', 'pitch=1', '--count', '100000', '--step', '1e-4'], 0.02),
-        (['identify', 'pipe.csv'], 0.01),
-        (['disc-sim', 'predict', 'pipe.csv'], 0.0),
+        ('datetime', ['fly']),
+        ('disc_sim_ros.physics.ensemble', ['sweep', '--scatter', 'pitch=1', '--count', '10']),
+        ('disc_sim_ros.physics.flight', ['identify', 'throw.csv']),
+        ('disc_sim_ros.physics.flight', ['disc-sim', 'predict', 'throw.csv']),
     ],
 )
-def test_a_program_that_still_loads_ends_without_a_traceback(command, delay, tmp_path):
+def test_a_program_that_still_loads_ends_without_a_traceback(
+    module, command, tmp_path, monkeypatch
+):
+    """Interrupted where numpy imports datetime in C, numpy took itself for a bad installation."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'throw.csv').touch()
     name, *words = command
-    os.mkfifo(tmp_path / 'pipe.csv')  # nothing comes out of it: what reads it does not end
-    code, error = interrupted([BIN / name, *words], delay, tmp_path)
+    code, error = interrupted(tmp_path, module, BIN / name, *words)
     assert error == ''
     assert code in ENDED
 
 
-def test_paper_figures_ends_without_a_traceback_while_its_workers_start(tmp_path):
+def test_paper_figures_ends_without_a_traceback_while_its_workers_start(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     command = [BIN / 'paper_figures', '--only', '3,9', '--out', 'out']
-    code, error = interrupted(command, 0.02, tmp_path, ready='parts into')
+    code, error = interrupted(tmp_path, EXECUTORS, *command, worker=True)
     assert error == ''
     assert code in ENDED
 
 
-# Interrupted while trimesh imports what it may do without, it went on and wrote the page.
-@pytest.mark.parametrize('name', ['fly', 'analyse_bag'])
-def test_ctrl_c_is_not_lost_in_an_import(name, tmp_path):
-    words = {'fly': ['--html', 'a.html'], 'analyse_bag': ['bag', '--html', 'a.html']}
-    if name == 'analyse_bag':
-        assert fly.main(['--bag', str(tmp_path / 'bag'), '--duration', '0.5']) == 0
-    page, command = tmp_path / 'a.html', [BIN / name, *words[name]]
-    code, error = interrupted(command, 0.0, tmp_path, library='/_nd_image', made=[page])
+def test_ctrl_c_is_not_lost_in_an_import_that_catches_all(workers, tmp_path):
+    text = 'import signal\nsignal.raise_signal(signal.SIGINT)\n'
+    (tmp_path / 'optional.py').write_text(text, encoding='utf-8')
+    done = workers(
+        before="""
+    try:
+        import optional
+    except BaseException:
+        print('not installed')
+"""
+    )
+    assert (done.stdout, done.stderr) == ('ready\n', '')
+    assert done.returncode in ENDED
+
+
+def test_no_page_is_written_after_ctrl_c(tmp_path, monkeypatch):
+    """Interrupted in what trimesh may do without, it went on; so it was in `analyse_bag`."""
+    monkeypatch.chdir(tmp_path)
+    command = [BIN / 'fly', '--html', 'a.html']
+    code, error = interrupted(tmp_path, 'scipy.ndimage._nd_image', *command)
     assert error == ''
     assert code in ENDED
-    assert not page.exists()
+    assert not (tmp_path / 'a.html').exists()
