@@ -1,6 +1,7 @@
 """Environments for one installation: symlinks to packages that another environment has."""
 
 from collections.abc import Collection
+import csv
 import functools
 from importlib.metadata import distribution, distributions
 import os
@@ -55,39 +56,51 @@ def link(prefix: Path, names: Collection[str], source: Path = Path(sys.prefix)) 
     owned = paths_of(source)
     if missing := set(names) - set(owned):
         raise LookupError(f'{source} has no {sorted(missing)}')
-    linked, others = set(), set()
+    linked: set[str] = set()
+    others: set[str] = set()
     for name, paths in owned.items():
         (linked if name in names else others).update(paths)
     shared = folders_of(others)
-    shared.update(folder for folder in folders_of(linked) if (prefix / folder).is_dir())
+    shared.update(one for one in folders_of(linked) if (prefix / one).is_dir())
     for path in {highest(path, shared) for path in linked}:
         (prefix / path).parent.mkdir(parents=True, exist_ok=True)
         (prefix / path).symlink_to(source / path)
 
 
 @functools.cache
-def paths_of(prefix: Path) -> dict[str, set[Path]]:
-    """Return the files of each package in an environment, except programs, by canonical name."""
+def paths_of(prefix: Path) -> dict[str, set[str]]:
+    """Return the files of each package in an environment, except programs, by canonical name.
+
+    There are 30,000; as paths in place of strings they would take a second.
+    """
     (site,) = (prefix / 'lib').glob('python3*/site-packages')
-    inside = site.relative_to(prefix)
-    owned: dict[str, set[Path]] = {}
+    inside = site.relative_to(prefix).as_posix()
+    owned: dict[str, set[str]] = {}
     for one in distributions(path=[str(site)]):
         paths = owned.setdefault(canonicalize_name(one.name), set())
-        for path in one.files or ():
-            top, *rest = os.path.normpath(inside / path).split('/')
-            if top != 'bin':
-                paths.add(Path('lib' if top == 'lib64' else top, *rest))  # lib64 is a link to lib
+        for name, *_ in csv.reader((one.read_text('RECORD') or '').splitlines()):
+            top, slash, rest = os.path.normpath(f'{inside}/{name}').partition('/')
+            if top != 'bin':  # lib64 is a link to lib
+                paths.add(f'{"lib" if top == "lib64" else top}{slash}{rest}')
     return owned
 
 
-def folders_of(paths: Collection[Path]) -> set[Path]:
-    """Return all folders on the way to some paths."""
-    parents = {path.parent for path in paths}
-    return parents | {folder for parent in parents for folder in parent.parents}
+def folders_of(paths: Collection[str]) -> set[str]:
+    """Return all folders on the way to some paths; '' is the environment itself."""
+    folders = set()
+    for path in paths:
+        folder = path.rpartition('/')[0]
+        while folder not in folders:
+            folders.add(folder)
+            folder = folder.rpartition('/')[0]
+    return folders
 
 
-def highest(path: Path, shared: Collection[Path]) -> Path:
+def highest(path: str, shared: Collection[str]) -> str:
     """Return the outermost folder of a path that is not shared, or the path itself."""
-    if path.parent in shared:
-        return path
-    return next(folder for folder in reversed(path.parents) if folder not in shared)
+    parts = path.split('/')
+    for number in range(1, len(parts)):
+        folder = '/'.join(parts[:number])
+        if folder not in shared:
+            return folder
+    return path

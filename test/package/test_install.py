@@ -22,6 +22,20 @@ pytestmark = pytest.mark.xdist_group('install')
 
 USE_ROS = {'sim_node', 'recorder_node', 'demo'}  # the only executables that may import rclpy
 SHARED = ('config', 'launch', 'urdf', 'rviz')
+# Each program with --help, in a copy of a process that has loaded what most of them import first.
+HELPS = """
+import os, runpy, sys
+import disc_sim_ros.cli.flags
+for path in sys.argv[1:]:
+    print('==', path, flush=True)
+    pid = os.fork()
+    if pid == 0:
+        sys.argv = [path, '--help']
+        runpy.run_path(path, run_name='__main__')
+        sys.exit()
+    if os.waitpid(pid, 0)[1]:
+        sys.exit(f'{path} failed')
+"""
 
 # Variables that child processes inherit from a virtual environment, a sourced ROS or ROS wheels.
 INHERITED = re.compile(
@@ -98,6 +112,16 @@ def test_without_git_the_sources_are_the_same():
     if not (shutil.which('git') and (ROOT / '.git').exists()):
         pytest.skip('this is not a git checkout')
     assert set(unignored_files()) == set(source_files())
+
+
+def check_helps(programs: list[Path], printed: str) -> None:
+    """Every program has printed its usage."""
+    _, *helps = re.split('^== ', printed, flags=re.M)
+    assert len(helps) == len(programs) > 0
+    for path, text in zip(programs, helps, strict=True):
+        first, _, rest = text.partition('\n')
+        assert first == str(path)
+        assert 'usage' in rest.lower()
 
 
 def check_files(prefix: Path) -> None:
@@ -217,8 +241,9 @@ def test_pip_metadata(pip_prefix):
 @pytest.mark.packaging
 def test_executables_without_ros_run_where_ros_is_not_installed(pip_prefix):
     run(pip_prefix / 'bin/python', '-c', 'import rclpy', cwd=pip_prefix, code=1)
-    for name in sorted(set(executables()) - USE_ROS):
-        assert 'usage' in run(pip_prefix / 'bin' / name, '--help', cwd=pip_prefix).lower()
+    programs = [pip_prefix / 'bin' / name for name in sorted(set(executables()) - USE_ROS)]
+    python = pip_prefix / 'bin/python'
+    check_helps(programs, run(python, '-c', HELPS, *programs, cwd=pip_prefix))
 
 
 @pytest.mark.packaging
@@ -254,17 +279,11 @@ def test_python_imports_the_package_that_colcon_installed(colcon_workspace):
 
 @pytest.mark.packaging
 def test_executables_run_after_colcon(colcon_workspace):
-    programs = colcon_workspace / 'install' / PACKAGE / 'lib' / PACKAGE
+    folder = colcon_workspace / 'install' / PACKAGE / 'lib' / PACKAGE
     without_ros = USE_ROS if find_spec('rclpy') is None else set()
-    names = sorted(set(executables()) - without_ros)
-    each = 'for name; do echo "== $name"; "$name" --help || exit; done'  # sourced once for all
-    shown = run_sourced(colcon_workspace, 'sh', '-c', each, 'sh', *(programs / n for n in names))
-    _, *helps = re.split('^== ', shown, flags=re.M)
-    assert len(helps) == len(names)
-    for name, text in zip(names, helps, strict=True):
-        first, _, rest = text.partition('\n')
-        assert first == str(programs / name)
-        assert 'usage' in rest.lower()
+    programs = [folder / name for name in sorted(set(executables()) - without_ros)]
+    python = colcon_workspace / 'environment/bin/python'
+    check_helps(programs, run_sourced(colcon_workspace, python, '-P', '-c', HELPS, *programs))
 
 
 @pytest.mark.packaging
