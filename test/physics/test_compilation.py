@@ -45,7 +45,7 @@ flown = {}
 for disc in disc_file.disc_names()[:: 5 if 'hide' in sys.argv else 1]:
     numbers = flown[disc] = []
     for model in MODELS:
-        setup = Setup(disc=disc_file.load_disc(disc), model=model, step=0.02, wind=gusty)
+        setup = Setup(disc=disc_file.load_disc(disc), model=model, step=0.03, wind=gusty)
         one = fly(launch, setup, control=control, sample_rate=10)
         numbers += [one.time, *one.end, one.apex, *one.trajectory.rows.ravel().tolist()]
         sim = simulator.FlightSimulator(setup, launch.state())
@@ -55,7 +55,7 @@ for disc in disc_file.disc_names()[:: 5 if 'hide' in sys.argv else 1]:
 numbers = flown['many'] = []
 many = {'speed': [14.0, 15.0, 16.0], 'roll_rate': 2.0, 'height': 1.0}
 for wind in (Wind(), gusty):
-    setup = Setup(disc=disc_file.load_disc('frisbee'), step=0.005, wind=wind)
+    setup = Setup(disc=disc_file.load_disc('frisbee'), step=0.02, wind=wind)
     landings = ensemble.fly_many(many, setup, control=control)
     numbers += [*landings.time.tolist(), *landings.states.ravel().tolist()]
 note = flight.first_call_note()
