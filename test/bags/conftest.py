@@ -1,6 +1,7 @@
 """What the tests of bags share: Foxglove's readers, from npm."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 import json
 import os
 from pathlib import Path
@@ -16,8 +17,11 @@ COPIED = ('package.json', 'package-lock.json', 'read.mjs')
 
 
 @pytest.fixture(scope='session')
-def foxglove() -> Callable[..., list[dict]]:
-    """A function that reads .mcap files with Foxglove's packages, installed once."""
+def foxglove() -> Iterator[Callable[..., list[dict]]]:
+    """A function that reads .mcap files with Foxglove's packages, installed once.
+
+    One process reads all: to load Node.js and the packages takes longer than to read a bag.
+    """
     node, npm = shutil.which('node'), shutil.which('npm')
     if node is None or npm is None:
         pytest.skip('node and npm are not installed: the readers of Foxglove cannot run')
@@ -34,16 +38,21 @@ def foxglove() -> Callable[..., list[dict]]:
     content = b''.join((SOURCE / name).read_bytes() for name in COPIED)
     folder = made_once('foxglove', content, install)
 
-    def read(*paths: Path) -> list[dict]:
-        done = subprocess.run(
-            [node, folder / 'read.mjs', *paths],
-            env={**os.environ, 'NODE_NO_WARNINGS': '1'},
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
+    with subprocess.Popen(
+        [node, folder / 'read.mjs'],
+        env={**os.environ, 'NODE_NO_WARNINGS': '1'},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
 
-    return read
+        def read(*paths: Path) -> list[dict]:
+            with suppress(BrokenPipeError):  # it ended at what it read before
+                print(json.dumps(list(map(str, paths))), file=process.stdin, flush=True)
+            answer = process.stdout.readline()
+            assert answer, process.stderr.read()
+            return json.loads(answer)
+
+        yield read
+        process.stdin.close()

@@ -1,8 +1,9 @@
-// Reads .mcap files as Foxglove does and prints, as JSON, every file's topics with the number of
-// decoded messages, the first and the last of them, and their times in nanoseconds.
-// usage: node read.mjs FILE.mcap ...
+// Reads .mcap files as Foxglove does. For each line on stdin, a JSON list of paths, it prints a line
+// of JSON: every file's topics with the number of decoded messages, the first and the last of them,
+// and their times in nanoseconds.
 
 import { open } from "node:fs/promises";
+import { createInterface } from "node:readline";
 
 import rosmsg from "@foxglove/rosmsg";
 import rosmsg2 from "@foxglove/rosmsg2-serialization";
@@ -58,6 +59,8 @@ async function read(path) {
   return { profile: reader.header.profile, topics, attachments };
 }
 
-const files = [];
-for (const path of process.argv.slice(2)) files.push(await read(path));
-console.log(JSON.stringify(files, plain));
+for await (const line of createInterface({ input: process.stdin })) {
+  const files = [];
+  for (const path of JSON.parse(line)) files.push(await read(path));
+  console.log(JSON.stringify(files, plain));
+}
