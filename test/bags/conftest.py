@@ -55,4 +55,5 @@ def foxglove() -> Iterator[Callable[..., list[dict]]]:
             return json.loads(answer)
 
         yield read
-        process.stdin.close()
+        with suppress(BrokenPipeError):
+            process.stdin.close()
