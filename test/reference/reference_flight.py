@@ -263,6 +263,13 @@ def _left_segment(y: np.ndarray, new: np.ndarray, air: tuple) -> tuple:
     return cell, 0.0, False
 
 
+@njit
+def _copy(source: np.ndarray, target: np.ndarray) -> None:
+    """Copy states. As an assignment to a slice it takes seconds to compile."""
+    for i in range(_STATES):
+        target[i] = source[i]
+
+
 @njit(cache=True)  # once for all processes that test with it
 def _integrate(y0: np.ndarray, times: np.ndarray, limits: tuple, model: tuple) -> tuple:
     """Fly from y0; return landed, the end time, the last state, the states at times, their count.
@@ -279,7 +286,7 @@ def _integrate(y0: np.ndarray, times: np.ndarray, limits: tuple, model: tuple) -
     cell = _find_cell(_air_angles(y, par)[1], nodes)
     while True:
         while count < len(times) and times[count] <= t:
-            samples[count] = y
+            _copy(y, samples[count])
             count += 1
         if t >= duration:
             return False, t, y, samples, count
@@ -305,11 +312,11 @@ def _integrate(y0: np.ndarray, times: np.ndarray, limits: tuple, model: tuple) -
         if par[_STOPS] != 0.0 and y[2] <= 0.0 < work[_NEW, 2]:
             if y[2] < 0.0:
                 t += _shorten(y, length, _GROUND, air, work)
-                y[:] = work[_NEW]
+                _copy(work[_NEW], y)
             return True, t, y, samples, count
         cell, turned_back = entered, 0
         t = target if reaches else t + length
-        y[:] = work[_NEW]
+        _copy(work[_NEW], y)
 
 
 def _launch_state(launch: Mapping) -> np.ndarray:
