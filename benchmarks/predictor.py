@@ -99,6 +99,7 @@ def main() -> int:
     p.add_argument('--first', type=int, default=0, help='seed of the first throw')
     p.add_argument('--cell', action='append', choices=tuple(CELLS), help='default: all')
     p.add_argument('--kind', default='both', choices=['both', 'position', 'attitude'])
+    p.add_argument('--whole', action='store_true', help='time updates up to the landing')
     o = p.parse_args()
     print(
         '| cell | measured | watched s | throws | bound m | own bound m | ours m | ratio | in % |'
@@ -107,14 +108,23 @@ def main() -> int:
     times: list[list[float]] = [[], []]
     for name in o.cell or CELLS:
         for kind in ('position', 'attitude') if o.kind == 'both' else [o.kind]:
-            rows(name, kind == 'attitude', range(o.first, o.first + o.throws), times)
+            rows(
+                name, kind == 'attitude', range(o.first, o.first + o.throws), times, whole=o.whole
+            )
     for what, values in zip(('landing', 'landing and ellipse'), times, strict=True):
         ms = 1e3 * np.array(values)
         print(f'{what}: {np.median(ms):.1f} ms, p99 {np.quantile(ms, 0.99):.1f} ms of CPU')
     return 0
 
 
-def rows(name: str, attitude: bool, seeds: range, times: list[list[float]]) -> None:  # noqa: FBT001
+def rows(
+    name: str,
+    attitude: bool,  # noqa: FBT001
+    seeds: range,
+    times: list[list[float]],
+    *,
+    whole: bool,
+) -> None:
     """Print the rows of a cell."""
     cell = CELLS[name]
     base = ThrowPrior()
@@ -136,7 +146,7 @@ def rows(name: str, attitude: bool, seeds: range, times: list[list[float]]) -> N
         )
         t = seen_from(t, cell.late)
         spoiled = with_outliers(t, cell.outliers, seed)
-        follow(t, spoiled, attitude, config, (exact, own), seed, results_of, times)
+        follow(t, spoiled, attitude, config, (exact, own), seed, results_of, times, whole=whole)
     for mark, results in results_of.items():
         miss, inside, bound, own, parabola, kalman = np.array(results).T
         middle = [float(np.median(x)) for x in (bound, miss)]
@@ -191,12 +201,16 @@ def follow(
     seed: int,
     results_of: dict[float, list[tuple[float, ...]]],
     times: list[list[float]],
+    *,
+    whole: bool,
 ) -> None:
     """Follow one throw, and note its misses."""
     predictor = Predictor(config)
     prediction = None
     rate = 1.0 / float(t.time[1] - t.time[0])
     for k, m in enumerate(t.measurements(axis=attitude)):
+        if m.time > MARKS[-1] + 0.5 / rate and not whole:
+            break
         mark = next((x for x in MARKS if abs(m.time - x) < 0.4 / rate), None)
         predictor.add(m)
         ellipse = mark is not None or prediction is None
@@ -220,8 +234,6 @@ def follow(
                 miss_of(kalman(known, t.position[: k + 1]), t),
             )
         )
-        if m.time > MARKS[-1]:
-            break
 
 
 def measured(t: Throw, attitude: bool, k: int) -> Measurements:  # noqa: FBT001

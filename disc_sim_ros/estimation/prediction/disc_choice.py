@@ -18,7 +18,8 @@ LEAST_WEIGHT = 1e-6  # a model below it is left out for the rest of the throw
 _WEIGHING_PERIOD = 0.1  # s
 _CERTAIN = 0.99  # probability of a model from which spins are weighed
 _SAME_SPIN = 2.0  # rad/s within which an estimate with another spin goes on
-_FIRST_STEPS = 2
+_FIRST_STEPS = 3  # of an unlikely model in one update
+_TOLD_STEPS = 2  # with a spin that the nutation tells
 _WORSE = 30.0  # half squares by which a throw with a known spin may fit worse, and no more
 
 
@@ -49,6 +50,7 @@ class DiscChoice:
         self._by_nutation: ThrowEstimator | None = None  # follows the spin that it tells
         self._belief: SpinBelief | None = None
         self._weighed = -math.inf  # s since the first measurement, when spins were weighed
+        self._prepared = False  # the models are fitted from which spins will be weighed
 
     @property
     def _leading(self) -> ThrowEstimator:
@@ -69,40 +71,60 @@ class DiscChoice:
         return linear
 
     def update(self, data: Measurements, steps: int = 1, *, unlikely: bool = True) -> Fitted:
-        """Fit all measurements of the throw with each model; return the fit of the most likely.
+        """Fit all measurements of the throw; return the fit of the most likely model.
 
         Args:
             data: All measurements so far, the first at time 0.
             steps: Gauss-Newton steps; the first update makes more.
             unlikely: Update the unlikely models, too, and the probabilities; or weigh spins.
         """
+        due = unlikely and float(data.time[-1]) >= self._weighed + _WEIGHING_PERIOD
+        if due and self._prepared:
+            self._weigh(data, steps)
+            return self.fitted
+        if self._by_nutation is not None:
+            self._by_nutation.update(data, steps, 1 if unlikely else MOST_MORE)
+        if self._by_nutation is None or due:
+            self._update_models(data, steps, unlikely=unlikely)
+        elif unlikely:
+            self._estimators[self.best].update(data, steps, 1)
+        self._prepared = due or (self._prepared and self._by_nutation is not None)
+        return self.fitted
+
+    def _update_models(self, data: Measurements, steps: int, *, unlikely: bool) -> None:
+        """Fit all measurements with each model, and weigh them."""
         kept = self._kept
-        weigh = unlikely and float(data.time[-1]) >= self._weighed + _WEIGHING_PERIOD
-        if self._by_nutation is not None and not weigh:
-            return self._by_nutation.update(data, steps)
         for i in kept:
-            if unlikely or i < self._likely or i == self.best:
-                # Where the spin is known, other models come near in several updates.
-                more = MOST_MORE if self._by_nutation is None or i == self.best else 1
-                self._estimators[i].update(data, steps, more)
-        if len(kept) > 1 and (unlikely or kept[-1] < self._likely):
+            if i == self.best and self._by_nutation is None:
+                self._estimators[i].update(data, steps)
+            elif i < self._likely or i == self.best:
+                self._estimators[i].update(data, steps, 1 if self._by_nutation else MOST_MORE)
+            elif unlikely:  # it comes near in several updates
+                self._estimators[i].update(data, steps, 1, _FIRST_STEPS)
+        settled = all(self._estimators[i].is_settled for i in kept)
+        if len(kept) > 1 and settled and (unlikely or kept[-1] < self._likely):
             evidence = np.array([self._estimators[i].log_evidence for i in kept])
             evidence += self._expected[kept]
             if np.isfinite(evidence).any():
                 probable = np.exp(evidence - evidence[np.isfinite(evidence)].max())
                 self.weights[:] = 0.0
                 self.weights[kept] = probable / probable.sum()
-                self.best = int(np.argmax(self.weights))
-        if weigh:
-            self._by_nutation = self._with_told_spin(data, steps)
-        return self.fitted
+                best, self.best = self.best, int(np.argmax(self.weights))
+                if self.best != best:
+                    self._by_nutation = None
+
+    def _weigh(self, data: Measurements, steps: int) -> None:
+        """Weigh spins by the models as the update before has left them: both would take long."""
+        self._weighed, self._prepared = float(data.time[-1]), False
+        self._by_nutation = self._with_told_spin(data, steps)
+        if self._by_nutation is None:
+            self._update_models(data, steps, unlikely=False)
 
     def _with_told_spin(self, data: Measurements, steps: int) -> ThrowEstimator | None:
         """Return an estimate with the spin that the nutation tells, beside the plain one.
 
         None where it tells nothing, or another model may be right.
         """
-        self._weighed = float(data.time[-1])
         plain, other = self._estimators[self.best], self._by_nutation
         certain = self.weights[self.best] > _CERTAIN and not plain.is_lost
         self._belief = plain.spins() if certain else None
@@ -115,9 +137,10 @@ class DiscChoice:
                 None if off > _SAME_SPIN else other if off < spin.sigma else other.with_spin(spin)
             )
         if other is None:
-            other, steps = plain.with_spin(spin), _FIRST_STEPS
-        worse = other.update(data, steps, 0).cost - plain.fitted.cost
-        return None if other.is_lost or worse > _WORSE else other
+            other, steps = plain.with_spin(spin), _TOLD_STEPS
+        fitted = other.update(data, steps, 0)
+        as_good = plain.fitted.cost * len(data.time) / len(plain.fitted.squares)
+        return None if other.is_lost or fitted.cost - as_good > _WORSE else other
 
     @property
     def _kept(self) -> list[int]:

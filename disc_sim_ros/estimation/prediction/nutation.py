@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from disc_sim_ros.arrays import FloatArray
+from disc_sim_ros.arrays import ComplexArray, FloatArray
 from disc_sim_ros.estimation.prediction.prior import Gaussian
 from disc_sim_ros.estimation.prediction.throw_fit import Measurements, Model
 from disc_sim_ros.physics.flight import Setup
@@ -96,27 +96,41 @@ def weighed(
     rate = model.setup.plant.I_z / model.setup.plant.I_x
     turns = rate * time * (1.0 + slowing * part)
     decayed = damping(model.setup, speeds[0]) * time * (1.0 + (speeds[1] / speeds[0] - 1.0) * part)
-    swing = np.exp(-decayed[:, None] + 1j * turns[:, None] * spins)
+    sizes = per_sigma * np.exp(-decayed)
+    swing = sizes[:, None] * _turned(turns, spins)
     # What changes slowly is of the fit: another disc than the assumed one, or a search under way.
     slow, _ = np.linalg.qr(per_sigma[:, None] * time[:, None] ** np.arange(_SLOW))
-    off, swing = (_without(slow, per_sigma * each.T).T for each in (off, swing))
+    off = per_sigma * off
+    off -= slow @ _products(slow, off[:, None])[:, 0]
     amplitude = model.prior.rate.sigma / (rate * np.abs(spins))  # rad, prior of each component
-    normal = np.sum(np.abs(swing) ** 2, axis=0)
-    projected = np.abs(np.einsum('kn,k->n', swing.conj(), off))
+    normal = float(sizes @ sizes) - np.sum(np.abs(_products(slow, swing)) ** 2, axis=0)
+    of_x, of_y = _products(np.column_stack([off.real, off.imag]), swing)
+    projected = np.abs(of_x - 1j * of_y)
     gain = 0.5 * projected**2 / (normal + amplitude**-2) - np.log1p(normal * amplitude**2)
     logarithms = gain - 0.5 * ((spins - plain.mean) / plain.sigma) ** 2
     weights = np.exp(logarithms - logarithms.max())
     return SpinBelief(spins, weights / weights.sum())
 
 
-def _without(basis: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return rows, shape (..., k), without their parts along a basis, shape (k, n)."""
-    along = np.einsum('...k,kn->...n', rows, basis)  # not by BLAS, whose threads take longer
-    rest: FloatArray = rows - np.einsum('...n,kn->...k', along, basis)
-    return rest
+def _turned(turns: FloatArray, spins: FloatArray) -> ComplexArray:
+    """Return turns of a length of 1 by each of evenly spaced spins, shape (k, n).
+
+    Each is the one before, turned by the same angle again: fifteen times as fast as exponentials.
+    """
+    turned = np.empty((len(turns), len(spins)), dtype=complex)
+    turned[:, 1:] = np.exp(1j * _STEP * turns)[:, None]
+    turned[:, :1] = np.exp(1j * spins[0] * turns)[:, None]
+    return np.asarray(np.cumprod(turned, axis=1), dtype=complex)
 
 
-def _off_the_axis(measured: FloatArray, fitted: FloatArray) -> FloatArray:
+def _products(columns: FloatArray, swing: ComplexArray) -> ComplexArray:
+    """Return products of real columns, shape (k, m), with complex ones, shape (k, n): (m, n)."""
+    parts = np.ascontiguousarray(swing).view(float)
+    product = np.einsum('km,kn->mn', columns, parts)  # not by BLAS, whose threads take longer
+    return np.asarray(product).view(complex)
+
+
+def _off_the_axis(measured: FloatArray, fitted: FloatArray) -> ComplexArray:
     """Return how far measured axes are from fitted ones, as complex numbers, shape (k,).
 
     The real part is along x of the earth across the fitted axis, and a turn about that axis goes
@@ -126,7 +140,7 @@ def _off_the_axis(measured: FloatArray, fitted: FloatArray) -> FloatArray:
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(fitted, first)
     off = measured - fitted
-    turned: FloatArray = np.einsum('ij,ij->i', off, first) + 1j * np.einsum(
+    turned: ComplexArray = np.einsum('ij,ij->i', off, first) + 1j * np.einsum(
         'ij,ij->i', off, second
     )
     return turned

@@ -57,21 +57,33 @@ class ThrowEstimator:
         self._scale = np.ones(SEEN)
         self._spread = _first_spread(model)
         self._data: Measurements | None = None
+        self._left = 0  # of the first steps
 
-    def update(self, data: Measurements, steps: int = 1, more: int = MOST_MORE) -> Fitted:
+    def update(
+        self,
+        data: Measurements,
+        steps: int = 1,
+        more: int = MOST_MORE,
+        first: int = FIRST_STEPS,
+    ) -> Fitted:
         """Fit all measurements of the throw.
 
         Args:
             data: All measurements so far, the first at time 0.
-            steps: Gauss-Newton steps; the first update makes more.
+            steps: Gauss-Newton steps.
             more: Further steps, at most, while the last led far.
+            first: Of the first FIRST_STEPS, how many this update makes at most.
         """
         model = self._model
-        if self.fitted is None or self.is_lost:
+        if self.fitted is None or (self.is_settled and self.is_lost):
             estimate, self._spread = first_estimate(model, data), _first_spread(model)
-            steps = FIRST_STEPS
+            self._left = FIRST_STEPS
         else:
             estimate = self.fitted.estimate
+        if self._left:
+            steps = min(self._left, first)
+            more = more if steps == self._left else 0
+            self._left -= steps
         narrow = False
         for k in range(1, steps + more + 1):
             duration = model.duration if k >= steps else 0.0
@@ -122,6 +134,11 @@ class ThrowEstimator:
         other.linear, other._spread, other._scale = self.linear, self._spread, self._scale
         other._data = self._data
         return other
+
+    @property
+    def is_settled(self) -> bool:
+        """Return True if the first steps are made."""
+        return self.fitted is not None and not self._left
 
     @property
     def is_lost(self) -> bool:
