@@ -10,7 +10,7 @@ exact model with the same prior, linear at the true throw. The own bound is that
 the predictor flies, if throws were so: it has no nutation, from which the exact one learns the
 spin. `in` is the share of the landings inside the predictor's 90 % ellipse.
 A throw counts at a time of watching while it is in the air. Every measurement is an update, as in
-`predictor_node`; those at a time of watching and the first of a throw are with the ellipse.
+`predictor_node`, with the ellipse 20 times a second.
 """
 
 import argparse
@@ -41,6 +41,7 @@ from disc_sim_ros.physics.sampled import fly_sampled
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from estimation.synthetic_throws import FINE, Throw, throw
 
+PERIOD = 0.05 - 1e-6  # s between two ellipses
 MARKS = (0.5, 1.0, 1.5)  # s of watching
 SIGMA, AXIS_SIGMA = 0.02, math.radians(2.0)
 INSIDE = 4.605  # of 90 %
@@ -207,18 +208,20 @@ def follow(
     """Follow one throw, and note its misses."""
     predictor = Predictor(config)
     prediction = None
+    of_ellipse = -math.inf
     rate = 1.0 / float(t.time[1] - t.time[0])
     for k, m in enumerate(t.measurements(axis=attitude)):
         if m.time > MARKS[-1] + 0.5 / rate and not whole:
             break
         mark = next((x for x in MARKS if abs(m.time - x) < 0.4 / rate), None)
         predictor.add(m)
-        ellipse = mark is not None or prediction is None
+        ellipse = mark is not None or prediction is None or m.time > of_ellipse + PERIOD
         begin = time.process_time()
         new = predictor.update(ellipse=ellipse)
         if new is not None:
             times[ellipse].append(time.process_time() - begin)
             prediction = new
+            of_ellipse = m.time if ellipse else of_ellipse
         if mark is None or prediction is None:
             continue
         off = prediction.landing - t.landing[:2]

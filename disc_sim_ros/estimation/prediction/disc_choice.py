@@ -16,6 +16,7 @@ from disc_sim_ros.estimation.prediction.throw_fit import Fitted, Linear, Measure
 
 LEAST_WEIGHT = 1e-6  # a model below it is left out for the rest of the throw
 _WEIGHING_PERIOD = 0.1  # s
+_NEARING_PERIOD = 0.03  # s, with which the plain estimate follows
 _CERTAIN = 0.99  # probability of a model from which spins are weighed
 _SAME_SPIN = 2.0  # rad/s within which an estimate with another spin goes on
 _FIRST_STEPS = 3  # of an unlikely model in one update
@@ -50,6 +51,7 @@ class DiscChoice:
         self._by_nutation: ThrowEstimator | None = None  # follows the spin that it tells
         self._belief: SpinBelief | None = None
         self._weighed = -math.inf  # s since the first measurement, when spins were weighed
+        self._neared = -math.inf  # s, when the plain estimate was updated beside the leading one
         self._prepared = False  # the models are fitted from which spins will be weighed
 
     @property
@@ -78,27 +80,31 @@ class DiscChoice:
             steps: Gauss-Newton steps; the first update makes more.
             unlikely: Update the unlikely models, too, and the probabilities; or weigh spins.
         """
-        due = unlikely and float(data.time[-1]) >= self._weighed + _WEIGHING_PERIOD
+        now = float(data.time[-1])
+        due = unlikely and now >= self._weighed + _WEIGHING_PERIOD
         if due and self._prepared:
             self._weigh(data, steps)
             return self.fitted
+        near = due or (unlikely and now >= self._neared + _NEARING_PERIOD)
+        most = MOST_MORE if unlikely else 1  # an ellipse takes as long as two steps
         if self._by_nutation is not None:
-            self._by_nutation.update(data, steps, 1 if unlikely else MOST_MORE)
+            self._by_nutation.update(data, steps, 0 if near else most)
         if self._by_nutation is None or due:
-            self._update_models(data, steps, unlikely=unlikely)
-        elif unlikely:
+            self._update_models(data, steps, most, unlikely=unlikely)
+        elif near:
             self._estimators[self.best].update(data, steps, 1)
+        self._neared = now if near else self._neared
         self._prepared = due or (self._prepared and self._by_nutation is not None)
         return self.fitted
 
-    def _update_models(self, data: Measurements, steps: int, *, unlikely: bool) -> None:
+    def _update_models(self, data: Measurements, steps: int, more: int, *, unlikely: bool) -> None:
         """Fit all measurements with each model, and weigh them."""
         kept = self._kept
         for i in kept:
             if i == self.best and self._by_nutation is None:
-                self._estimators[i].update(data, steps)
+                self._estimators[i].update(data, steps, more)
             elif i < self._likely or i == self.best:
-                self._estimators[i].update(data, steps, 1 if self._by_nutation else MOST_MORE)
+                self._estimators[i].update(data, steps, 1 if self._by_nutation else more)
             elif unlikely:  # it comes near in several updates
                 self._estimators[i].update(data, steps, 1, _FIRST_STEPS)
         settled = all(self._estimators[i].is_settled for i in kept)
@@ -118,7 +124,7 @@ class DiscChoice:
         self._weighed, self._prepared = float(data.time[-1]), False
         self._by_nutation = self._with_told_spin(data, steps)
         if self._by_nutation is None:
-            self._update_models(data, steps, unlikely=False)
+            self._update_models(data, steps, MOST_MORE, unlikely=False)
 
     def _with_told_spin(self, data: Measurements, steps: int) -> ThrowEstimator | None:
         """Return an estimate with the spin that the nutation tells, beside the plain one.
