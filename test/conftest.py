@@ -51,6 +51,7 @@ class ByFile(LoadGroupScheduling):  # type: ignore[misc] - without types
         return str(super()._split_scope(node_id)).partition('::')[0]
 
 
+@pytest.hookimpl(optionalhook=True)  # also without pytest-xdist
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile | None:
     """Return what spreads the tests with `--dist loadgroup`."""
     return ByFile(config, log) if config.getvalue('dist') == 'loadgroup' else None
