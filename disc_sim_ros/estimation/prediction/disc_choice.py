@@ -86,25 +86,25 @@ class DiscChoice:
             self._weigh(data, steps)
             return self.fitted
         near = due or (unlikely and now >= self._neared + _NEARING_PERIOD)
-        most = MOST_MORE if unlikely else 1  # an ellipse takes as long as two steps
         if self._by_nutation is not None:
+            most = MOST_MORE if unlikely else 1  # an ellipse takes as long as two steps
             self._by_nutation.update(data, steps, 0 if near else most)
         if self._by_nutation is None or due:
-            self._update_models(data, steps, most, unlikely=unlikely)
+            self._update_models(data, steps, unlikely=unlikely)
         elif near:
             self._estimators[self.best].update(data, steps, 1)
         self._neared = now if near else self._neared
         self._prepared = due or (self._prepared and self._by_nutation is not None)
         return self.fitted
 
-    def _update_models(self, data: Measurements, steps: int, more: int, *, unlikely: bool) -> None:
+    def _update_models(self, data: Measurements, steps: int, *, unlikely: bool) -> None:
         """Fit all measurements with each model, and weigh them."""
         kept = self._kept
         for i in kept:
             if i == self.best and self._by_nutation is None:
-                self._estimators[i].update(data, steps, more)
+                self._estimators[i].update(data, steps)
             elif i < self._likely or i == self.best:
-                self._estimators[i].update(data, steps, 1 if self._by_nutation else more)
+                self._estimators[i].update(data, steps, 1 if self._by_nutation else MOST_MORE)
             elif unlikely:  # it comes near in several updates
                 self._estimators[i].update(data, steps, 1, _FIRST_STEPS)
         settled = all(self._estimators[i].is_settled for i in kept)
@@ -124,7 +124,7 @@ class DiscChoice:
         self._weighed, self._prepared = float(data.time[-1]), False
         self._by_nutation = self._with_told_spin(data, steps)
         if self._by_nutation is None:
-            self._update_models(data, steps, MOST_MORE, unlikely=False)
+            self._update_models(data, steps, unlikely=False)
 
     def _with_told_spin(self, data: Measurements, steps: int) -> ThrowEstimator | None:
         """Return an estimate with the spin that the nutation tells, beside the plain one.
