@@ -37,7 +37,7 @@ def tree(tmp_path) -> Path:
     shutil.copy(ROOT / 'pyproject.toml', tmp_path)
     shutil.copytree(ROOT / 'tools', tmp_path / 'tools', ignore=shutil.ignore_patterns('viewer'))
     check = (tmp_path / 'tools/check').read_text(encoding='utf-8')
-    for text, quick in ((' -n 4 ', ' -n 1 '), ('sleep 5 ', 'sleep 0 ')):
+    for text, quick in ((' -n 3 ', ' -n 1 '), ('sleep 5 ', 'sleep 0 ')):
         assert check.count(text) == 1
         check = check.replace(text, quick)
     (tmp_path / 'tools/check').write_text(check, encoding='utf-8')
