@@ -136,7 +136,7 @@ class DiscChoice:
         self._belief = plain.spins() if certain else None
         if self._belief is None or plain.fitted is None:
             return None
-        spin = self._belief.likeliest
+        spin = self._belief.estimate
         if other is not None and other.fitted is not None:
             off = abs(float(other.fitted.estimate.state[SPIN]) - spin.mean)
             other = (

@@ -23,6 +23,7 @@ _REACH, _FARTHEST = 4.0, 100.0  # to both sides: standard deviations of the spin
 _SLOWEST = 5.0  # rad/s; a slower disc goes round less than once before its nutation is gone
 _PEAK = 2.0  # rad/s to both sides of the likeliest spin that tell how exactly it is known
 _LEAST_SIGMA = 0.3  # rad/s
+_LEAST_SHARE = 0.5  # of the probability near the likeliest spin, if it is to be followed
 _SLOW = 4  # powers of the time, from 0 on, that axes may be off by without a nutation
 _VX, SPIN = State._fields.index('VX'), State._fields.index('r')
 
@@ -40,13 +41,19 @@ class SpinBelief:
     weights: FloatArray
 
     @property
-    def likeliest(self) -> Gaussian:
-        """Return the likeliest spin, and how exactly it is known if it is the right one."""
-        best = self.spins[int(np.argmax(self.weights))]
+    def estimate(self) -> Gaussian:
+        """Return the likeliest spin, and how exactly it is known if it is the right one.
+
+        Where less than half of the probability is near it, the mean of all spins: a throw that
+        follows one of several peaks lands metres off if it is the wrong one.
+        """
+        best = float(self.spins[int(np.argmax(self.weights))])
         near = np.abs(self.spins - best) <= _PEAK
+        if float(self.weights[near].sum()) < _LEAST_SHARE:
+            near, best = np.full(len(near), fill_value=True), float(self.weights @ self.spins)
         squares = float(self.weights[near] @ (self.spins[near] - best) ** 2)
         variance = squares / float(self.weights[near].sum())
-        return Gaussian(float(best), max(math.sqrt(variance), _LEAST_SIGMA))
+        return Gaussian(best, max(math.sqrt(variance), _LEAST_SIGMA))
 
     def drawn(self, shares: FloatArray) -> FloatArray:
         """Return the spins below which these shares of the probability lie [rad/s]."""
